@@ -95,6 +95,23 @@ void check_target(const Mesh& target, const std::string& where, ExamineOptions o
   }
 }
 
+void UpWatch::look(const Points& cloud, const std::string& where) {
+  if (first_.size() < kSourceFrames && cloud.size() >= kEnoughPoints) {
+    first_.push_back({cloud, {}});
+    if (first_.size() == kSourceFrames) {
+      Given frames(first_);
+      const Diagnosis d = examine_frames(frames);
+      const Finding* up = d.find("up");
+      if (up != nullptr && up->weight == Weight::wrong && up->sure >= kVerySure) {
+        wrong_ = *up;
+        fix_ = up_advice(d.orientation.up, given_.up);
+      }
+      for (Mesh& m : first_) m = {};
+    }
+  }
+  if (wrong_) refuse(where, *wrong_, fix_);
+}
+
 bool may_be_a_person(const Points& frame) {
   const double size = normalised(frame).size;
   constexpr double kRoom = 2;  // stray points, or half of somebody

@@ -103,7 +103,23 @@ inline constexpr int kSourceFrames = 8;  ///< that are enough for check_source()
 void check_source(const std::vector<Mesh>& first_frames, const std::string& where,
                   const SourceFrame& given = {});
 void check_target(const Mesh& target, const std::string& where, ExamineOptions options = {});
-/// The same for any later frame, cheaply: whether it is of a person's size, in metres.
+
+/// What check_source() says of the up axis, for a source that comes cloud by cloud.
+class UpWatch {
+ public:
+  explicit UpWatch(SourceFrame given = {}) : given_(std::move(given)) {}
+  /// Takes the next cloud, already in metres, y up, as given. InputError with the kSourceFrames-th
+  /// cloud and each one after it, where these clouds stand up along another axis.
+  void look(const Points& cloud, const std::string& where);
+
+ private:
+  SourceFrame given_;
+  std::vector<Mesh> first_;
+  std::optional<Finding> wrong_;
+  std::string fix_;
+};
+
+/// Cheaply, of any frame: whether it is of a person's size, in metres.
 bool may_be_a_person(const Points& frame);
 void check_frame(const Points& frame, const std::string& where);
 

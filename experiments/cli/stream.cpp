@@ -128,6 +128,7 @@ class Stream {
          live::Mailbox& box, live::Words& words)
       : c_(c),
         to_ours_(c.how.source.scale, c.how.source.up),
+        up_({c.how.source.scale, c.how.source.up}),
         system_(system),
         vmc_(vmc),
         page_(page),
@@ -205,7 +206,10 @@ class Stream {
       leave_out(fault);
     } catch (const InputError& fault) {
       leave_out(fault);
+      return;
     }
+    // No cloud that follows would be better, so the program ends.
+    if (!c_.how.options.force) up_.look(cloud_.points, cloud_.name);
   }
 
   /// More points than a network looks at cost time and say nothing new.
@@ -250,6 +254,7 @@ class Stream {
 
   const StreamCommand& c_;
   const ToOurs to_ours_;
+  UpWatch up_;
   System& system_;
   live::VmcSender& vmc_;
   live::PageServer* page_;

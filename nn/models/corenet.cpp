@@ -96,26 +96,30 @@ Elain::Elain(int64_t channels, int64_t identity, const Init& init)
       beta(channels, channels, init.sub("beta"), true, 1),
       mix(2 * channels, channels, init.sub("mix"), true, 1) {}
 
-Normalised::Normalised(const Var& x) {
+WithMean::WithMean(const Var& values) : x(values), mean(restage::mean(values, 1)) {}
+
+Normalised::Normalised(const Var& values) : WithMean(values) {
   constexpr double kEps = 1e-5;
   const auto points = static_cast<double>(x.size(1));
   if (x.size(1) < 2)
     shape_error("elain", "x[n, v, c], v > 1", std::array{x.value}, "one point has no deviation");
-  mean = restage::mean(x, 1);
-  const Var difference = x - of_all_points(mean);
-  deviation = sqrt(add_scalar(scale(sum(square(difference), 1), 1 / (points - 1)), kEps));
-  unit = difference / of_all_points(deviation);
+  const double unbiased = (points - 1) / points;
+  unit = scale(instance_norm(x, kEps * unbiased), std::sqrt(unbiased));
 }
 
-Var Elain::operator()(Context& ctx, const Normalised& x, const Var& identity) const {
+Var Elain::through_same(Context& ctx, const Linear& of, const Var& x) const {
+  const int64_t channels = of.bias.value.size(0);
+  const Var weight = of.matrix(ctx);
+  const Var bias = linear(reshape(ctx.bind(same.bias), {1, channels}), weight, ctx.bind(of.bias));
+  return linear(x, matmul(weight, same.matrix(ctx)), reshape(bias, {channels}));
+}
+
+Var Elain::operator()(Context& ctx, const Normalised& x, const WithMean& identity) const {
   const ModuleScope path(scope);
-  const Var asked = same(ctx, identity);
-  const Var share = mix(ctx, concat({mean(asked, 1), x.mean}, 1));
-  const Var rest = add_scalar(neg(share), 1);
-  const auto between = [&](const Linear& of, const Var& own) {
-    return of(ctx, asked) * of_all_points(share) + of_all_points(own);
-  };
-  return x.unit * between(gamma, add_scalar(x.deviation * rest, 1)) + between(beta, x.mean * rest);
+  const Var share = mix(ctx, concat({same(ctx, identity.mean), x.mean}, 1));
+  const Var asked =
+      x.unit * through_same(ctx, gamma, identity.x) + through_same(ctx, beta, identity.x);
+  return of_all_points(share) * asked + x.unit + of_all_points(add_scalar(neg(share), 1)) * x.x;
 }
 
 void Elain::visit(Fields& f) {
@@ -133,7 +137,7 @@ ElainBlock::ElainBlock(int64_t channels, int64_t identity, const Init& init)
       c1(channels, channels, init.sub("c1")),
       cs(channels, channels, init.sub("cs"), false) {}
 
-Var ElainBlock::operator()(Context& ctx, const Var& x, const Var& identity) {
+Var ElainBlock::operator()(Context& ctx, const Var& x, const WithMean& identity) {
   const ModuleScope path(scope);
   const Normalised own(x);
   const Normalised h(c0(ctx, leaky_relu(n0(ctx, own, identity), kLeak)));
@@ -169,7 +173,8 @@ Var CoreNet::posed(Context& ctx, const Var& pose, const Var& identity,
   const ModuleScope path(scope);
   const Correspondence::Found matched = corr(ctx, pose, identity);
   Var x = fc.same(ctx, matched.warped, 1);
-  for (size_t i = 0; i < convs.size(); ++i) x = blocks[i](ctx, convs[i](ctx, x), matched.features);
+  const WithMean identity_features(matched.features);
+  for (size_t i = 0; i < convs.size(); ++i) x = blocks[i](ctx, convs[i](ctx, x), identity_features);
   if (found != nullptr) *found = matched;
   return points_of(ctx, out, x);
 }

@@ -56,26 +56,39 @@ struct Correspondence : Module {
   Var features(Context& ctx, const Var& points) const;
 };
 
-/// What ElaIN makes of features x [n, v, c], v > 1.
-struct Normalised {
-  explicit Normalised(const Var& x);
-  Var mean, deviation;  ///< [n, c]; unbiased
-  Var unit;             ///< (x - mean) / deviation
+/// Features with their mean over the points.
+struct WithMean {
+  explicit WithMean(const Var& x);
+  Var x;     ///< [n, v, c]
+  Var mean;  ///< [n, c]
 };
 
-/// Elastic instance normalisation: (x - m) / s (1 + gamma) + beta, with gamma and beta between what
-/// the identity's features f [n, v, i] ask for and x's own deviation s and mean m.
+/// What all ElaINs of features x [n, v, c], v > 1, need of them.
+struct Normalised : WithMean {
+  explicit Normalised(const Var& x);
+  Var unit;  ///< (x - mean) / s, with the unbiased deviation s
+};
+
+/// Elastic instance normalisation: unit (1 + G) + B, with scale and shift between what the
+/// identity's features ask for, gamma and beta, and x's own deviation s and mean m:
+///   G = share gamma + (1 - share) s,   B = share beta + (1 - share) m,   share = mix(same f, m).
+/// Since s unit + m is x itself, that is share (unit gamma + beta) + unit + (1 - share) x. gamma
+/// and beta are linear in the features f [n, v, i], so one product each makes them of f.
 struct Elain : Module {
   Elain(int64_t channels, int64_t identity, const Init& init);
-  Var operator()(Context& ctx, const Normalised& x, const Var& identity) const;
+  Var operator()(Context& ctx, const Normalised& x, const WithMean& identity) const;
   void visit(Fields& f) override;
   const char* kind() const override { return "ElaIN"; }
   Linear same, gamma, beta, mix;
+
+ private:
+  /// of(same(x)) by one product.
+  Var through_same(Context& ctx, const Linear& of, const Var& x) const;
 };
 
 struct ElainBlock : Module {
   ElainBlock(int64_t channels, int64_t identity, const Init& init);
-  Var operator()(Context& ctx, const Var& x, const Var& identity);
+  Var operator()(Context& ctx, const Var& x, const WithMean& identity);
   void visit(Fields& f) override;
   const char* kind() const override { return "ElaINBlock"; }
   Elain n0, n1, ns;

@@ -237,6 +237,20 @@ class Streams(StreamTest):
         self.assertEqual((process.returncode, out), (2, b""), err)
         self.assertIn("standard input: holds no frame; send frames as docs/stream.md says", err.decode())
 
+    def test_clouds_whose_z_points_up(self):
+        for given in ([], ["--force"]):
+            process = self.stream("-", *given)
+            for k, points in enumerate(self.clouds[:8]):
+                process.stdin.write(frame(k / 30, [(x, -z, y) for x, y, z in points]))
+                process.stdin.flush()
+                self.assertIsNotNone(self.receiver.next())
+            out, err = process.communicate(timeout=30)
+            if given:
+                self.assertEqual(process.returncode, 0, err)
+            else:
+                self.assertEqual((process.returncode, out), (2, b""), err)
+                self.assertIn("give --source-up z, or --force", err.decode().splitlines()[-1])
+
     def test_without_standard_input(self):
         command = '"$@" <&-'
         done = subprocess.run(["sh", "-c", command, "sh", PROGRAM, "stream", "--target", self.target, "--in", "-", "--vmc",

@@ -61,6 +61,20 @@ def test_bad_clouds(walk, bad):
     assert np.array_equal(system.push(good).vertices, before)
 
 
+def test_clouds_whose_z_points_up(walk):
+    clouds = [np.asarray(c) for c in restage.load_clouds(walk / "source.h5")]
+    lying = [np.stack([c[:, 0], -c[:, 2], c[:, 1]], axis=1) for c in clouds]
+    system = restage.System(walk / "target.ply", LITE, samples=1)
+    for cloud in lying[:7]:
+        system.push(cloud)
+    for _ in range(2):
+        with pytest.raises(restage.InputError, match="give --source-up z"):
+            system.push(lying[7])
+    upright = restage.System(walk / "target.ply", LITE, samples=1, source_up="z")
+    forced = restage.System(walk / "target.ply", LITE, samples=1, force=True)
+    assert all(s.push(c) for s in (upright, forced) for c in lying)
+
+
 def test_bad_sources(walk):
     for bad in (3, [], [np.zeros((5, 2))], np.zeros((3, 3)), [None], object()):
         with pytest.raises(restage.InputError):
