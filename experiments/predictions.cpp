@@ -5,6 +5,7 @@
 
 #include "autograd/base/error.h"
 #include "experiments/mesh_frames.h"
+#include "experiments/text.h"
 #include "nn/geometry/closed_form.h"
 
 namespace restage {
@@ -13,8 +14,6 @@ namespace {
 using metrics::SequenceView;
 using metrics::Surfaces;
 using metrics::Track;
-
-std::string counted(int64_t n, const std::string& what) { return std::to_string(n) + " " + what; }
 
 void append(const std::vector<Joints>& frames, std::vector<double>* values) {
   for (const Joints& joints : frames)
@@ -159,7 +158,7 @@ void PredictionFile::carry(const WorldMap& map, bool rigid, double stretched) {
 void check_same_frames(const PredictionFile& file, const PredictionFile& truth) {
   if (file.data.frames == truth.data.frames) return;
   throw InputError(file.path,
-                   "has " + counted(file.data.frames, "frames, but ") + truth.path + " has " +
+                   "has " + counted(file.data.frames, "frame") + ", but " + truth.path + " has " +
                        std::to_string(truth.data.frames) +
                        (file.remarks.empty() ? "" : " (" + file.remarks.front() + ")"),
                    "give files of the same frames");
@@ -194,7 +193,7 @@ References references(const PredictionFile& source, const PredictionFile& rest,
   const int64_t sequences = std::ssize(offset) - 1, rows = rest.data.frames;
   if (rows != 1 && rows != sequences && rows != truth.data.frames)
     throw InputError(rest.path + ":/joints",
-                     "has " + counted(rows, "skeletons for ") + counted(sequences, "sequences"),
+                     "has " + counted(rows, "skeleton") + " for " + counted(sequences, "sequence"),
                      "give the rest joints of one body, or one row for every sequence");
   Made made;
   const auto carried = std::make_shared<CarriedRest>(rest.vertices(), offset);

@@ -46,6 +46,10 @@ std::string error_line(const std::string& text) {
   return line.substr(0, head) + "..." + line.substr(tail);
 }
 
+std::string counted(int64_t n, const std::string& what) {
+  return std::to_string(n) + " " + what + (n == 1 ? "" : "s");
+}
+
 std::string markdown_table(const std::vector<std::vector<std::string>>& rows) {
   std::vector<size_t> widths;
   for (const auto& row : rows)

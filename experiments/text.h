@@ -1,6 +1,7 @@
 // Text for people: one line of anything, tables.
 #pragma once
 
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -14,6 +15,8 @@ std::string on_one_line(std::string text);
 std::string shell_word(const std::string& text);
 /// `restage: <text>` as exactly one line of under 400 characters.
 std::string error_line(const std::string& text);
+/// "1 frame", "3 frames".
+std::string counted(int64_t n, const std::string& what);
 /// A Markdown table with columns of equal width; the first row is the heading, the first column is
 /// aligned left, the others right.
 std::string markdown_table(const std::vector<std::vector<std::string>>& rows);

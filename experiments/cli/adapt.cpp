@@ -8,6 +8,7 @@
 #include "experiments/cli/source_options.h"
 #include "experiments/cli/standard_weights.h"
 #include "experiments/slow_work.h"
+#include "experiments/text.h"
 
 namespace restage::cli {
 namespace {
@@ -96,7 +97,8 @@ int run_adapt(const AdaptCommand& c, const Common& common) {
         1e3 * done.after.jitter, 1e3 * done.before.surface, 1e3 * done.after.surface));
   save_bundle(c.out, models);
   if (done.left_out > 0)
-    log_warning(std::to_string(done.left_out) + " frames teach nothing; the first: " + done.why);
+    log_warning("teaching nothing: " + counted(done.left_out, "frame") +
+                "; the first: " + done.why);
   const Json document = {
       {"out", c.out},
       {"frames",

@@ -12,6 +12,7 @@
 #include "experiments/cli/source_options.h"
 #include "experiments/cli/standard_weights.h"
 #include "experiments/slow_work.h"
+#include "experiments/text.h"
 #include "infer/render/page.h"
 #include "nn/models/extraction.h"
 
@@ -96,7 +97,7 @@ std::vector<std::string> places_of(const Assessment& found) {
 
 std::string text_of(const Assessment& found, const std::string& path, uint64_t seed) {
   Rows rows = rows_of(found);
-  rows.insert(rows.begin(), {path, std::to_string(found.frames) + " frames"});
+  rows.insert(rows.begin(), {path, counted(found.frames, "frame")});
   std::string out = markdown_table(rows);
   for (const std::string& place : places_of(found)) out += place + "\n";
   return out + "seed " + std::to_string(seed) + "\n";
@@ -168,13 +169,13 @@ int run_assess(const AssessCommand& c, const Common& common) {
       page.add(i, p, seen);
     };
   SlowWork slow;
-  slow.on("looking at " + std::to_string(source.frames()) + " frames");
+  slow.on("looking at " + counted(source.frames(), "frame"));
   const Assessment found = assess(source, models, weights_path(weights), options);
   slow.on("");
   if (!c.out.empty()) page.write(c.out, found, c.source.path, source.fps());
   for (const std::string& remark : source.remarks()) log_warning(remark);
   if (found.left_out > 0)
-    log_warning(std::to_string(found.left_out) + " frames are left out; the first: " + found.why);
+    log_warning("left out: " + counted(found.left_out, "frame") + "; the first: " + found.why);
   print(common.json, document_of(found, common.seed), text_of(found, c.source.path, common.seed));
   return 0;
 }

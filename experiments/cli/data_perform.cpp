@@ -7,6 +7,7 @@
 #include "datasets/schema.h"
 #include "experiments/cli/commands.h"
 #include "experiments/cli/output.h"
+#include "experiments/text.h"
 
 namespace restage::cli {
 namespace {
@@ -51,8 +52,8 @@ int run_perform(const PerformOptions& o, const Common& common) {
   write_sequence(Performance(corpus, s, ScanConfig{}, common.seed),
                  {corpus.license, corpus.description}, o.out);
   print(common.json, {{"out", o.out}, {"frames", s.frames}, {"seed", common.seed}},
-        "wrote " + o.out + "/{source.h5,target.ply,rest.h5,truth.h5}: " + std::to_string(s.frames) +
-            " frames (seed " + std::to_string(common.seed) + ")\n");
+        "wrote " + o.out + "/{source.h5,target.ply,rest.h5,truth.h5}: " +
+            counted(s.frames, "frame") + " (seed " + std::to_string(common.seed) + ")\n");
   return 0;
 }
 

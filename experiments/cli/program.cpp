@@ -127,6 +127,38 @@ CommandTree described(const CLI::App& command) {
   return out;
 }
 
+/// The option or argument that a message of the parser begins with, or null.
+const CLI::Option* named_in(const CLI::App& command, const std::string& message) {
+  for (const CLI::Option* option : command.get_options()) {
+    const std::string name = option->get_name();
+    if (message.starts_with(name) && message.find_first_of(": ") == name.size()) return option;
+  }
+  return nullptr;
+}
+
+/// The parser's own message in plain words.
+std::string in_plain_words(const CLI::App& command, const CLI::ParseError& error) {
+  const std::string message = error.what();
+  if (dynamic_cast<const CLI::ConversionError*>(&error) != nullptr) {
+    const std::string rest = message.substr(std::min(message.size(), message.find("--")));
+    const CLI::Option* option = named_in(command, rest);
+    const size_t value = rest.find(" = ");
+    if (option == nullptr || value == std::string::npos) return message;
+    const bool whole = option->get_type_name().find("INT") != std::string::npos;
+    return "'" + rest.substr(value + 3) + "' is no " + (whole ? "whole " : "") + "number, and " +
+           option->get_name() + " needs one";
+  }
+  const CLI::Option* option = named_in(command, message);
+  if (option == nullptr) return message;
+  if (dynamic_cast<const CLI::ArgumentMismatch*>(&error) != nullptr)
+    return option->get_name() + " needs a value";
+  if (dynamic_cast<const CLI::RequiredError*>(&error) == nullptr || !option->get_positional())
+    return message;
+  constexpr size_t kShort = 90;
+  const std::string says = option->get_description();
+  return option->get_name() + " is required" + (says.size() < kShort ? ": " + says : "");
+}
+
 /// What was wrong with the arguments that `app` just refused, with the nearest known name.
 InputError usage_error(const CLI::App& app, const CLI::ParseError& error) {
   const CLI::App& command = innermost(app);
@@ -149,7 +181,7 @@ InputError usage_error(const CLI::App& app, const CLI::ParseError& error) {
   if (!known.empty() && command.get_subcommands().empty() &&
       dynamic_cast<const CLI::RequiredError*>(&error) != nullptr)
     return InputError("", "'" + words + "' needs a command", help);
-  return InputError("", error.what(), help);
+  return InputError("", in_plain_words(command, error), help);
 }
 
 /// Results are files or folders, of every command.

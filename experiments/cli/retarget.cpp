@@ -22,6 +22,7 @@
 #include "experiments/cli/source_options.h"
 #include "experiments/cli/standard_weights.h"
 #include "experiments/source.h"
+#include "experiments/text.h"
 #include "infer/frame_rate.h"
 
 namespace restage::cli {
@@ -226,7 +227,7 @@ Retargeted told(const RetargetCommand& c, const Common& common, const Source& so
     document["confidence"] = done.confidence;
   }
   if (c.profile) document["profile"] = profile.json();
-  std::string text = "wrote " + c.to.out + ": " + std::to_string(frames) + " frames (seed " +
+  std::string text = "wrote " + c.to.out + ": " + counted(frames, "frame") + " (seed " +
                      std::to_string(common.seed) + ")";
   if (!done.filled.empty()) text += "; " + std::to_string(done.filled.size()) + " of them filled";
   if (done.held > 0) text += "; in " + std::to_string(done.held) + " of them the target waits";

@@ -7,6 +7,7 @@
 #include "experiments/cli/output.h"
 #include "experiments/cli/retarget.h"
 #include "experiments/cli/retarget_words.h"
+#include "experiments/text.h"
 #include "infer/frame_rate.h"
 
 namespace restage::cli {
@@ -137,8 +138,8 @@ Retargeted run_take(const RetargetCommand& c, const Common& common, const Retarg
   const Json document = {{"out", c.to.out},   {"source_frames", take.frames.size()},
                          {"frames", frames},  {"fps", c.to.rate()},
                          {"clip", take.name}, {"from", "skeleton"}};
-  return {document, "wrote " + c.to.out + ": " + std::to_string(frames) +
-                        " frames, the motion of the source's skeleton\n"};
+  return {document, "wrote " + c.to.out + ": " + counted(frames, "frame") +
+                        ", the motion of the source's skeleton\n"};
 }
 
 }  // namespace restage::cli
