@@ -29,16 +29,14 @@ struct EvalOptions {
 
 using File = PredictionFile;
 
-std::string counted(int64_t n, const std::string& what) { return std::to_string(n) + " " + what; }
-
 void check_pair(const File& pred, const File& truth) {
   check_same_frames(pred, truth);
   const bool joints = pred.joints().present() && truth.joints().present();
   const bool vertices = pred.vertices().present() && truth.vertices().present();
   if (vertices && pred.data.vertex_count != truth.data.vertex_count)
     throw InputError(pred.path + ":/vertices",
-                     "has " + counted(pred.data.vertex_count, "vertices, but ") + truth.path +
-                         " has " + std::to_string(truth.data.vertex_count),
+                     "has " + std::to_string(pred.data.vertex_count) + " vertices, but " +
+                         truth.path + " has " + std::to_string(truth.data.vertex_count),
                      "give surfaces with the same vertices");
   if (!joints && !vertices && truth.data.frames > 0)
     throw InputError(pred.path, "has nothing in common with " + truth.path,
