@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "autograd/base/interrupt.h"
 #include "autograd/base/log.h"
 #include "autograd/ops/elementwise.h"
 #include "autograd/ops/layout.h"
@@ -91,6 +92,7 @@ void look(SkeletonModel& model, Sequence& sequence, double fps, const AdaptOptio
   JointExtractor extract(model, options.views, kAllAround, false, true);
   const SeenJoints* before = nullptr;
   for (size_t i = 0; i < sequence.taught; ++i) {
+    throw_if_stopped();
     Cloud& cloud = sequence.clouds[i];
     try {
       if (cloud.fault) throw *cloud.fault;
@@ -235,6 +237,7 @@ void teach(SkeletonModel& model, const std::vector<Sequence>& sequences,
   Optimiser optimiser({{"skeleton", &model}}, how);
   ExampleWriter writer(model, options.batch);
   for (int64_t step = 0; step < options.steps; ++step) {
+    throw_if_stopped();
     Rng rng(key.fold(static_cast<uint64_t>(step)));
     writer.made.past = Tensor::zeros(writer.made.past.shape(), DType::f32);
     for (int64_t i = 0; i < options.batch; ++i) {

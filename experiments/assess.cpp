@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <numeric>
 
+#include "autograd/base/interrupt.h"
 #include "datasets/doctor/examine.h"
 #include "infer/own_body.h"
 #include "nn/geometry/steady_bones.h"
@@ -127,6 +128,7 @@ Assessment assess(Source& source, const Bundle& weights, const std::string& weig
   std::optional<SeenJoints> before;
   SteadyBones bones;
   for (int64_t i = 0; auto cloud = source.next(); ++i) {
+    throw_if_stopped();
     const Points& points = cloud->frame.points;
     try {
       if (cloud->fault) throw *cloud->fault;

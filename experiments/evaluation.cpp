@@ -293,6 +293,11 @@ SystemEvaluation evaluate_system(const Bundle& weights, const std::string& weigh
     for (auto& reference : scores.references) metrics::average(&reference.second);
   }
   if (type.parts) judge_extractor(weights, corpus, options.clouds, &out);
+  if (out.conditions.empty() && !out.joint_error)
+    throw InputError(
+        weights_name,
+        "cannot be judged as evaluation.system=" + type.name + ": " + out.missing.front(),
+        "name the system of these weights, or train what is missing");
   return out;
 }
 

@@ -2,6 +2,7 @@
 
 #include <chrono>
 
+#include "autograd/base/interrupt.h"
 #include "autograd/base/log.h"
 
 namespace restage {
@@ -23,6 +24,7 @@ SlowWork::~SlowWork() {
 }
 
 void SlowWork::on(std::string what) {
+  throw_if_stopped();
   const std::lock_guard lock(mutex_);
   what_ = std::move(what);
 }

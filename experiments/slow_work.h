@@ -16,7 +16,8 @@ class SlowWork {
   ~SlowWork();
   SlowWork(const SlowWork&) = delete;
   SlowWork& operator=(const SlowWork&) = delete;
-  /// What begins now, such as "reading real.h5"; "": nothing that is worth a word.
+  /// What begins now, such as "reading real.h5"; "": nothing that is worth a word. Interrupted if
+  /// the program was asked to stop.
   void on(std::string what);
 
  private:

@@ -114,11 +114,6 @@ H4dSystem::H4dSystem(const Bundle& weights, const std::string& weights_name, Mes
           static_cast<size_t>(trained_points(weights.need("codes", weights_name), weights_name))),
       frames_of_window_(static_cast<size_t>(model_->config.frames)),
       source_(model_->space) {
-  if (options.fps != kFps)
-    throw InputError("",
-                     format("the source has %g frames a second, and this system answers each cloud",
-                            options.fps),
-                     "give clouds at 30 frames a second");
   if (target.vertices.empty()) throw InputError(where, "has no vertices", "give a mesh or a cloud");
   if (points_ == 0)
     throw InputError(weights_name, "says that its network sees no points",

@@ -1,5 +1,6 @@
 #include "infer/systems.h"
 
+#include "autograd/base/format.h"
 #include "autograd/base/nearest.h"
 #include "infer/h4d.h"
 #include "infer/own_skin.h"
@@ -74,15 +75,18 @@ std::vector<SystemType>& table() {
       {.name = "register",
        .help = "no learning: the target is registered to each cloud, then reposed",
        .needs_rest = true,
+       .each_cloud = true,
        .make = make_registration},
       {.name = "transfer",
        .help = "one network that moves vertices, without a skeleton (NPT, LART, 3D-CoreNet)",
        .roles = {"transfer"},
+       .each_cloud = true,
        .own_skin = false,
        .make = make_transfer},
       {.name = "h4d",
        .help = "codes of shape, pose and motion of windows of clouds (H4D)",
        .roles = {"codes"},
+       .each_cloud = true,
        .make = make_h4d},
   };
   return all;
@@ -99,6 +103,11 @@ void register_system(SystemType type) {
 }
 
 std::unique_ptr<System> make_system(const SystemType& type, SystemInput input) {
+  if (type.each_cloud && input.options.fps != kFps)
+    throw InputError("",
+                     format("the source has %g frames a second, and --system %s answers each cloud",
+                            input.options.fps, type.name.c_str()),
+                     "give clouds at 30 frames a second, or use --system chain");
   const auto own = std::move(input.own);
   if (!own) return type.make(std::move(input));
   if (!type.own_skin)

@@ -31,6 +31,7 @@ struct SystemType {
   std::vector<std::string> surface = {};
   bool parts = false;       ///< a Retargeter, whose networks can be judged one by one
   bool needs_rest = false;  ///< whether it needs SystemInput::rest
+  bool each_cloud = false;  ///< answers each cloud, so the source must have 30 frames a second
   bool own_skin = true;     ///< gives joints, so that a target's own skin can pose its vertices
   std::unique_ptr<System> (*make)(SystemInput input);
 };

@@ -65,11 +65,6 @@ Transfer::Transfer(const Bundle& weights, const std::string& weights_name, Mesh 
   const TrainedModel& found = weights.need("transfer", weights_name);
   model_ = std::dynamic_pointer_cast<TransferModel>(found.net);
   if (model_ == nullptr) weights.need_as<TransferModel>("transfer", weights_name);
-  if (options.fps != kFps)
-    throw InputError("",
-                     format("the source has %g frames a second, and this system answers each cloud",
-                            options.fps),
-                     "give clouds at 30 frames a second");
   if (target_.vertices.size() < 2)
     throw InputError(where,
                      "has " + std::string(target_.vertices.empty() ? "no" : "one") + " vertex",
@@ -116,7 +111,7 @@ Points Transfer::seen_of(const Points& cloud, const std::string& source) const {
   if (cloud.size() != target_.vertices.size())
     throw InputError(source,
                      "has " + std::to_string(cloud.size()) +
-                         " points, and this network needs the target's " +
+                         " points that can be used, and this network needs the target's " +
                          std::to_string(target_.vertices.size()) + " vertices in their order",
                      "give meshes of the source that correspond to the target, or weights of "
                      "another model");

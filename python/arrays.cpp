@@ -18,6 +18,9 @@ py::array_t<T, py::array::c_style> numbers(const py::handle& value, const std::s
     throw InputError(what, wrong, "give an array of numbers");
   };
   if (!value || value.is_none() || py::isinstance<py::str>(value)) refuse("is no array");
+  if (py::hasattr(value, "mask"))
+    throw InputError(what, "is a masked array, whose mask would be lost",
+                     "leave the masked points out: a.compressed(), or a[keep]");
   const py::array any = py::array::ensure(value);
   if (!any) PyErr_Clear(), refuse("is no array");
   const char kind = any.dtype().kind();

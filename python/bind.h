@@ -5,15 +5,32 @@
 #include <pybind11/pybind11.h>
 #include <pybind11/stl.h>
 
+#include <chrono>
+#include <exception>
 #include <functional>
 #include <string>
+#include <type_traits>
 #include <vector>
 
+#include "autograd/base/interrupt.h"
 #include "experiments/cli/program.h"
+
+namespace restage {
+class Tensor;
+struct Parameter;
+}  // namespace restage
 
 namespace restage::python {
 
 namespace py = pybind11;
+
+/// A class that Python knows: ours say so with `using Bound = void;`, those of the engine stand
+/// here.
+template <class T>
+concept BoundToPython = requires {
+  typename T::Bound;
+}
+|| std::is_same_v<T, Tensor> || std::is_same_v<T, Parameter>;
 
 void add_errors(py::module_& m);
 void add_command(py::module_& m);
@@ -57,6 +74,7 @@ class Watch {
   template <class Work>
   auto run(const Work& work) -> decltype(work()) {
     const py::gil_scoped_release released;
+    const HostSignals asked([this] { return wanted(); });
     try {
       return work();
     } catch (...) {
@@ -66,7 +84,29 @@ class Watch {
   }
 
  private:
+  /// Whether to stop. Asks Python some times a second, not more.
+  bool wanted();
+  std::chrono::steady_clock::time_point looked_{};
   std::exception_ptr caught_;
 };
 
 }  // namespace restage::python
+
+namespace pybind11::detail {
+
+/// pybind11 gives memory that holds nothing for an object whose __init__ was not called, as where a
+/// subclass uses itself before super().__init__(). Here that is a TypeError.
+template <class T>
+class type_caster<T, std::enable_if_t<restage::python::BoundToPython<T>>>
+    : public type_caster_base<T> {
+ public:
+  bool load(handle from, bool convert) {
+    const type_info* type = get_type_info(typeid(T), true);
+    if (from && PyObject_TypeCheck(from.ptr(), type->type) &&
+        !reinterpret_cast<instance*>(from.ptr())->get_value_and_holder(type).holder_constructed())
+      throw type_error(std::string(type->type->tp_name) + ": __init__ was not called yet");
+    return type_caster_base<T>::load(from, convert);
+  }
+};
+
+}  // namespace pybind11::detail

@@ -141,6 +141,17 @@ void Watch::operator()(const std::function<void()>& look) {
   }
 }
 
+bool Watch::wanted() {
+  const auto now = std::chrono::steady_clock::now();
+  if (caught_ || now - looked_ < std::chrono::milliseconds(50)) return caught();
+  looked_ = now;
+  try {
+    (*this)();
+  } catch (const Interrupted&) {
+  }
+  return caught();
+}
+
 void add_command(py::module_& m) {
   set_log_level(LogLevel::quiet);
   m.def("run", &run_words, "Runs `restage WORDS` in this process and returns what it would print.");

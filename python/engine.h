@@ -19,16 +19,19 @@ std::recursive_mutex& recording();
 
 /// A tape that lives as long as a value on it does, so that no value of Python's can lose its tape.
 struct PyTape {
+  using Bound = void;
   Tape tape;
 };
 
 struct PyVar {
+  using Bound = void;
   Var var;
   std::shared_ptr<PyTape> tape;  ///< null: a constant, or a value on a tape of C++ (gradcheck)
   uint64_t leaf = 0;             ///< its identity, if it is a leaf
 };
 
 struct PyGradients {
+  using Bound = void;
   Gradients gradients;
   /// Of a leaf or a parameter; null if the loss does not depend on it.
   const Tensor* find(const py::handle& of) const;

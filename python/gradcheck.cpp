@@ -38,6 +38,7 @@ gradcheck::Build build_of(const py::object& f, std::exception_ptr& raised) {
 }
 
 struct PyReport {
+  using Bound = void;
   gradcheck::Report report;
 };
 

@@ -49,6 +49,8 @@ py::object measure(const std::string& name, const py::object& pred, const py::ob
     view.pred_vertices = tp, view.true_vertices = tt;
   Numbers j;
   if (!joints.is_none()) {
+    if (metric.of_joints != nullptr || rotations)
+      throw InputError("joints", "say nothing to " + name, "leave joints out");
     j = numbers<double>(joints, "joints");
     view.true_joints = track_of(j, "joints");
     if (view.true_joints.frames != tp.frames)

@@ -10,6 +10,7 @@
 namespace restage::python {
 
 struct PyModel {
+  using Bound = void;
   std::string name;
   std::shared_ptr<Module> net;
   /// In the order of the state dict; each keeps the network alive.

@@ -119,12 +119,14 @@ class PyOptimiser {
 };
 
 struct PyAdam : PyOptimiser {
+  using Bound = void;
   PyAdam(const py::object& parameters, double rate, double beta1, double beta2, double eps,
          double weight_decay)
       : PyOptimiser(parameters, rate, {beta1, beta2, eps, weight_decay}, {}) {}
 };
 
 struct PyMuon : PyOptimiser {
+  using Bound = void;
   PyMuon(const py::object& parameters, double rate, double momentum, double step, double beta1,
          double beta2, double eps, double weight_decay)
       : PyOptimiser(parameters, rate, {beta1, beta2, eps, weight_decay},

@@ -95,6 +95,7 @@ Var call_own(const Shared& f, std::span<const Var> inputs) {
 
 class OwnOp {
  public:
+  using Bound = void;
   OwnOp(const std::string& name, const py::object& forward, const py::object& backward,
         const std::string& letters)
       : functions_(shared({forward, backward, name, letters})) {

@@ -2,6 +2,7 @@
 #include <mutex>
 
 #include "autograd/kernels/kernel.h"
+#include "datasets/doctor/examine.h"
 #include "experiments/cli/standard_weights.h"
 #include "nn/models/extraction.h"
 #include "nn/weights/bundle.h"
@@ -12,6 +13,7 @@ namespace {
 
 class PyExtractor {
  public:
+  using Bound = void;
   PyExtractor(const py::object& weights, int samples, uint64_t seed, const std::string& device)
       : key_(RngKey{seed, 0}.fold("skeleton")) {
     if (samples < 1 || samples > 256)
@@ -28,6 +30,7 @@ class PyExtractor {
 
   py::tuple operator()(const py::object& points, const std::string& name) {
     const Points cloud = points_of(points, name);
+    check_frame(cloud, name);
     SeenJoints seen;
     {
       const py::gil_scoped_release released;

@@ -15,6 +15,7 @@ namespace {
 
 /// A frame of the result, for itself: nothing of the system is needed any more.
 struct Frame {
+  using Bound = void;
   Points vertices;
   std::vector<float> joints, rotations;
   std::optional<double> confidence;
@@ -36,6 +37,7 @@ py::object view(const py::object& frame, const float* data, std::vector<py::ssiz
 
 class PySystem {
  public:
+  using Bound = void;
   PySystem(const py::object& target, const py::object& weights, const py::dict& options) {
     std::vector<std::string> words = words_of(options);
     words.push_back("--target=" + path_of(target));
@@ -111,7 +113,7 @@ class PySystem {
   }
 
   void make(const cli::Common& common) {
-    cli::check_options(c_.options);
+    cli::check_options(c_.options, system_type(c_.system));
     to_ours_.emplace(c_.source.scale, c_.source.up);
     up_.emplace(SourceFrame{c_.source.scale, c_.source.up});
     if (c_.source.fps && !(*c_.source.fps >= 1 && *c_.source.fps <= 1000))

@@ -107,8 +107,11 @@ Tensor tensor_of(const py::handle& value, bool share) {
   if (!as_held) throw py::error_already_set();
   void* data = const_cast<void*>(as_held.data());
   // What may not be written to is no memory for a tensor, which assign() writes to.
-  if ((share && as_held.writeable()) || data != any.data())
-    return Tensor::borrow(shape, type, data, keeper_of(as_held));
+  if (share && (data != any.data() || any.ptr() != value.ptr() || !as_held.writeable()))
+    refuse(
+        "copy=False: this array's memory cannot be shared; give a C-contiguous array of float32, "
+        "float64, int32 or int64 that may be written to, or leave copy out");
+  if (share || data != any.data()) return Tensor::borrow(shape, type, data, keeper_of(as_held));
   Tensor out = Tensor::empty(shape, type);
   if (out.numel() > 0) std::memcpy(out.bytes(), data, static_cast<size_t>(as_held.nbytes()));
   return out;
@@ -142,8 +145,8 @@ void add_tensor(py::module_& m) {
   py::class_<Tensor>(m, "Tensor",
                      R"(Numbers in memory: float32, float64, int32 or int64, up to six axes.
 
-Tensor(array) copies; Tensor(array, copy=False) shares the array's memory where it can, and keeps the array alive;
-who changes the array then changes the tensor. NumPy sees a tensor through numpy() or np.asarray(), without a
+Tensor(array) copies; Tensor(array, copy=False) shares the array's memory and keeps the array alive; ShapeError where
+it cannot. Who changes the array then changes the tensor, unseen by a tape: never between forward and backward. NumPy sees a tensor through numpy() or np.asarray(), without a
 copy and read-only, since a tape relies on what it was given; assign() writes.)")
       .def(py::init([](const py::object& a, bool copy, const std::optional<std::string>& dtype) {
              Tensor out = tensor_of(a, !copy);

@@ -6,6 +6,7 @@
 
 #include <atomic>
 #include <cstdint>
+#include <utility>
 
 #include "autograd/base/temporary.h"
 
@@ -16,6 +17,7 @@ std::atomic<int> scopes{0};
 std::atomic<int> caught{0};
 std::atomic<bool> asked{false};
 std::atomic<int64_t> caught_at{0};  // milliseconds
+thread_local const std::function<bool()>* host = nullptr;
 static_assert(std::atomic<int>::is_always_lock_free, "used in a signal handler");
 
 constexpr int64_t kSameRequest = 500;  // milliseconds
@@ -65,9 +67,19 @@ void ask_to_stop() {
   if (scopes.load() > 0) asked = true;
 }
 
-bool stop_requested() { return caught.load() != 0 || asked.load(); }
+HostSignals::HostSignals(std::function<bool()> ask) : ask_(std::move(ask)), outer_(host) {
+  host = &ask_;
+}
+HostSignals::~HostSignals() { host = outer_; }
+
+bool stop_requested() {
+  if (caught.load() != 0 || asked.load()) return true;
+  if (host != nullptr && (*host)()) asked = true;
+  return asked.load();
+}
 
 void throw_if_stopped() {
+  if (!stop_requested()) return;
   if (const int signal = caught.load(); signal != 0) throw Interrupted(signal);
   if (asked.load()) throw Interrupted(SIGTERM);
 }

@@ -3,6 +3,8 @@
 // training run can write a checkpoint first.
 #pragma once
 
+#include <functional>
+
 #include "autograd/base/error.h"
 
 namespace restage {
@@ -33,7 +35,21 @@ class StopScope {
 /// way. If a signal comes as well, it still counts as the first.
 void ask_to_stop();
 
-/// True after a signal in a StopScope, or ask_to_stop().
+/// While it exists, stop_requested() in this thread also asks a host program that handles signals
+/// itself, such as Python. `ask` returns whether to stop, and must not throw.
+class HostSignals {
+ public:
+  explicit HostSignals(std::function<bool()> ask);
+  ~HostSignals();
+  HostSignals(const HostSignals&) = delete;
+  HostSignals& operator=(const HostSignals&) = delete;
+
+ private:
+  std::function<bool()> ask_;
+  const std::function<bool()>* outer_;
+};
+
+/// True after a signal in a StopScope, ask_to_stop(), or where a host says so.
 bool stop_requested();
 /// Throws Interrupted if stop_requested().
 void throw_if_stopped();

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <atomic>
 #include <exception>
+#include <map>
 #include <memory>
 #include <mutex>
 #include <utility>
@@ -16,10 +17,12 @@
 
 namespace restage {
 namespace {
+std::mutex limit_mutex;  // of the next two
 std::unique_ptr<tbb::global_control> limit;
-std::unique_ptr<tbb::task_arena> arena;
-std::mutex limit_mutex;
-int requested = 0;
+// By their sizes. None is ever destroyed: another thread may be at work in it.
+std::map<int, std::unique_ptr<tbb::task_arena>> arenas;
+std::atomic<tbb::task_arena*> arena{nullptr};
+std::atomic<int> requested{0};
 std::atomic<int64_t> cut{0};
 
 /// The threads of a group; of whichever group this thread works in.
@@ -52,8 +55,8 @@ template <class F>
 void run_all(const F& work) {
   if (group != nullptr)
     group->arena->execute(work);
-  else if (arena)
-    arena->execute(work);
+  else if (tbb::task_arena* chosen = arena.load())
+    chosen->execute(work);
   else
     work();
 }
@@ -63,17 +66,20 @@ void set_threads(int n) {
   const std::lock_guard lock(limit_mutex);
   requested = n;
   limit.reset();
-  arena.reset();
+  arena = nullptr;
   if (n <= 0) return;
   limit = std::make_unique<tbb::global_control>(tbb::global_control::max_allowed_parallelism,
                                                 static_cast<size_t>(n));
   // An arena of n slots, so that more threads than cores can be asked for (determinism tests do).
-  arena = std::make_unique<tbb::task_arena>(n);
+  std::unique_ptr<tbb::task_arena>& wanted = arenas[n];
+  if (!wanted) wanted = std::make_unique<tbb::task_arena>(n);
+  arena = wanted.get();
 }
 
 int threads() {
   if (group != nullptr) return group->size;
-  return requested > 0 ? requested : tbb::this_task_arena::max_concurrency();
+  const int n = requested;
+  return n > 0 ? n : tbb::this_task_arena::max_concurrency();
 }
 
 void parallel_for(int64_t n, int64_t grain, PieceRef body) {
@@ -82,7 +88,7 @@ void parallel_for(int64_t n, int64_t grain, PieceRef body) {
   const int64_t pieces = (n + grain - 1) / grain;
   cut.fetch_add(pieces, std::memory_order_relaxed);
   const auto piece = [&](int64_t i) { body(i * grain, std::min(n, (i + 1) * grain)); };
-  if (pieces == 1 || (group != nullptr ? group->size : requested) == 1) {
+  if (pieces == 1 || (group != nullptr ? group->size : requested.load()) == 1) {
     for (int64_t i = 0; i < pieces; ++i) piece(i);
     return;
   }

@@ -7,7 +7,8 @@
 
 namespace restage {
 
-/// Number of threads used by parallel_for from now on (0: all cores).
+/// Number of threads used by parallel_for from now on (0: all cores). May be called while other
+/// threads are at work, who keep those that they have.
 void set_threads(int n);
 int threads();
 

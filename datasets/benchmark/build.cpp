@@ -5,6 +5,7 @@
 #include <map>
 #include <set>
 
+#include "autograd/base/interrupt.h"
 #include "autograd/base/atomic_file.h"
 #include "autograd/base/log.h"
 #include "autograd/base/temporary.h"
@@ -200,6 +201,7 @@ class Builder {
                    const std::string& folder) const {
     for (size_t m = 0; m < r_.motions.size(); ++m)
       for (const PairRecipe& p : pairs) {
+        throw_if_stopped();
         const std::string& motion = r_.motions[m].id;
         if (!p.motions.empty() &&
             std::find(p.motions.begin(), p.motions.end(), motion) == p.motions.end())

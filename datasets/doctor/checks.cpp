@@ -51,6 +51,20 @@ std::string up_advice(int up, const std::string& given) {
   return own == Axis::y ? "leave --source-up out" : "give --source-up " + to_string(own);
 }
 
+/// float32 holds coordinates to a centimetre up to here.
+void check_near(const Points& frame, const std::string& where) {
+  constexpr float kFar = 100'000;
+  if (frame.empty()) return;
+  const float far = frame.front().cwiseAbs().maxCoeff();
+  if (far > kFar)
+    throw InputError(
+        where,
+        "lies " + number(1e-3 * far) +
+            " km from the origin, where single precision loses centimetres",
+        "subtract the same origin from all frames, give the unit with --scale, or --force "
+        "to take it as it is");
+}
+
 }  // namespace
 
 void check_source(const std::vector<Mesh>& first_frames, const std::string& where,
@@ -58,6 +72,7 @@ void check_source(const std::vector<Mesh>& first_frames, const std::string& wher
   for (const Mesh& frame : first_frames)
     if (frame.vertices.size() < kEnoughPoints) return;  // refused when its turn comes
   if (first_frames.empty()) return;
+  check_near(first_frames.front().vertices, where);
   Given frames(first_frames);
   const Diagnosis d = examine_frames(frames);
   const bool some_odd = !std::all_of(first_frames.begin(), first_frames.end(),
@@ -120,6 +135,7 @@ bool may_be_a_person(const Points& frame) {
 }
 
 void check_frame(const Points& frame, const std::string& where) {
+  check_near(frame, where);
   if (may_be_a_person(frame)) return;
   throw InputError(where,
                    "is of another size than people: half of its points lie within " +

@@ -12,6 +12,7 @@
 #include "datasets/sampling/dress.h"
 #include "datasets/sampling/intruder.h"
 #include "datasets/sampling/memory.h"
+#include "datasets/sampling/skirt.h"
 #include "datasets/sampling/things.h"
 
 namespace restage {
@@ -34,8 +35,9 @@ CloudConfig checked(const CloudConfig& c) {
   check_setting("cloud", c.bend >= 0 && c.bend <= 90, "bend", "0 to 90 degrees");
   check_setting("cloud", c.intruder >= 0 && c.intruder <= 1, "intruder", "0 to 1");
   check_setting("cloud", c.remembered >= 0 && c.remembered <= 1, "remembered", "0 to 1");
-  for (const double share : {c.things, c.cut_floor, c.smoothed})
-    check_setting("cloud", share >= 0 && share <= 1, "things, cut_floor, smoothed", "0 to 1");
+  for (const double share : {c.things, c.cut_floor, c.smoothed, c.skirts})
+    check_setting("cloud", share >= 0 && share <= 1, "things, cut_floor, smoothed, skirts",
+                  "0 to 1");
   check_setting("cloud", c.min_fraction > 0 && c.min_fraction <= 1, "min_fraction", "above 0 to 1");
   return c;
 }
@@ -161,6 +163,7 @@ CloudSubject CloudSampler::subject(int64_t index) const {
   out.thing = capture.uniform() < config_.things && !out.rest;
   out.cut_floor = capture.uniform() < config_.cut_floor && !out.rest;
   out.smoothed = capture.uniform() < config_.smoothed ? capture.uniform(0.2, 1.0) : 0;
+  out.skirt = capture.uniform() < config_.skirts;
   return out;
 }
 
@@ -224,6 +227,7 @@ CloudSampler::Drawn CloudSampler::draw(const CloudSubject& subject, const Surfac
       out.points[i] += outfit.thickness(weights.data(), rest[i]) * out.normals[i];
     }
   }
+  if (subject.skirt) add_skirt(subject, samples, key.fold("skirt"), &out);
   augment(subject.augmentation, out.points);
   augment(subject.augmentation, out.normals);
   for (Point& p : out.points) p *= static_cast<float>(subject.scale);
@@ -231,6 +235,22 @@ CloudSampler::Drawn CloudSampler::draw(const CloudSubject& subject, const Surfac
   out.turns = augmented(subject.augmentation, out.turns);
   for (Vec3& joint : out.joints) joint *= subject.scale;
   return out;
+}
+
+void CloudSampler::add_skirt(const CloudSubject& subject, const SurfaceSamples& samples,
+                             const RngKey& key, Drawn* drawn) const {
+  constexpr std::array<size_t, 5> kCovered = {0, 1, 2, 4, 5};  // hips to ankles, no feet
+  Rng rng(key);
+  const Skirt skirt = draw_skirt(rng);
+  std::vector<bool> legs(drawn->points.size());
+  std::array<float, kJoints> weights;
+  for (size_t i = 0; i < legs.size(); ++i) {
+    samples.skin_weights(corpus_.bodies.at(subject.body), i, false, weights.data());
+    float share = 0;
+    for (const size_t j : kCovered) share += weights[j];
+    legs[i] = share >= 0.5f;
+  }
+  put_on(skirt, drawn->joints, legs, rng, drawn->points, drawn->normals);
 }
 
 CloudSampler::Seen CloudSampler::see(const CloudSubject& subject, size_t n, const RngKey& scene,

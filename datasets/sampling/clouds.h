@@ -30,6 +30,7 @@ struct CloudConfig {
   double things = 0;          ///< part with a thing in the hand or beside the foot (things.h)
   double cut_floor = 0;       ///< part whose lowest 1 to 8 cm were cut away with the floor
   double smoothed = 0;        ///< part whose surface a coarse volume has smoothed
+  double skirts = 0;          ///< part with a skirt, or the lower part of a coat (skirt.h)
   double remembered = 0;      ///< part with a memory of the frame before (CloudBatch::past)
   bool skin_weights = false;  ///< also fill CloudBatch::weights
   bool rotations = false;     ///< also fill CloudBatch::turns
@@ -72,7 +73,7 @@ struct CloudSubject {
   Sensor sensor = Sensor::none;
   bool dressed = false;
   bool intruder = false;
-  bool thing = false, cut_floor = false;
+  bool thing = false, cut_floor = false, skirt = false;
   double smoothed = 0;  ///< 0 to 1, of smoothing()
   enum class Memory { none, drawn, asked } memory = Memory::none;
   size_t step_back = 1;  ///< how many frames ago the remembered one is
@@ -106,6 +107,8 @@ class CloudSampler {
     Rotations turns;
   };
   Drawn draw(const CloudSubject& subject, const SurfaceSamples& samples, const RngKey& key) const;
+  void add_skirt(const CloudSubject& subject, const SurfaceSamples& samples, const RngKey& key,
+                 Drawn* drawn) const;
   /// What a sensor sees of it; which of the samples each point is, kNobody of somebody else.
   struct Seen {
     SurfaceSamples samples;

@@ -16,6 +16,7 @@
 #include "experiments/cli/output.h"
 #include "experiments/cli/source_options.h"
 #include "experiments/clips.h"
+#include "experiments/text.h"
 #include "infer/render/page.h"
 #include "infer/render/sheet.h"
 #include "nn/geometry/skeleton.h"
@@ -161,9 +162,12 @@ class Rows {
       source_ = source->path;
     }
     std::optional<Clip> truth;
-    if (!options_.truth.empty())
-      truth = timed(read({.path = options_.truth, .sequence = options_.sequence}, "truth"));
-    if (truth) add_errors(*truth, &result);
+    if (!options_.truth.empty()) {
+      Clip whole = read({.path = options_.truth, .sequence = options_.sequence}, "truth");
+      check_same_motion(whole, result);
+      truth = timed(std::move(whole));
+      add_errors(*truth, &result);
+    }
     out.push_back(std::move(result));
     if (truth) out.push_back(std::move(*truth));
     return out;
@@ -172,6 +176,18 @@ class Rows {
   const Remarks& remarks() const { return remarks_; }
 
  private:
+  /// Another rate may cut off or add a frame.
+  void check_same_motion(const Clip& truth, const Clip& result) const {
+    const double seconds = static_cast<double>(truth.frames.size()) / truth.fps;
+    const double other = static_cast<double>(result.frames.size()) / result.fps;
+    if (std::abs(seconds - other) > 1.5 / std::min(truth.fps, result.fps))
+      throw InputError(options_.truth,
+                       "has " + counted(std::ssize(truth.frames), "frame") +
+                           format(" (%.3g s), and ", seconds) + options_.result + " has " +
+                           counted(std::ssize(result.frames), "frame") + format(" (%.3g s)", other),
+                       "give the truth of the same motion");
+  }
+
   Clip read(const SourceRecord& how, const std::string& label) {
     Clip out = read_clip(how, label, common_.max_memory, remarks_);
     if (!options_.focus.empty())

@@ -1,6 +1,7 @@
 // restage retarget: clouds of one body in, the same motion by another body out, frame by frame.
 #include <unistd.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <memory>
@@ -34,7 +35,7 @@ void check(const RetargetCommand& c, const RetargetCaller& caller) {
   SinkOptions to = c.to;
   if (caller.sink) to.out = "arrays.h5";  // what goes with such a file goes with arrays
   check_sink(to);
-  check_options(c.options);
+  check_options(c.options, system_type(c.system));
   if (caller.sink) return;
   std::vector<std::string> inputs = {c.target};
   if (!caller.clouds) inputs.push_back(c.source.path);
@@ -341,7 +342,27 @@ void add_weights_options(CommandOptions app, RetargetCommand& c) {
   app.add_option("--rest", c.rest, "the target's 22 rest joints (HDF5, /joints [1, 22, 3])");
 }
 
-void check_options(const RetargetOptions& options) {
+namespace {
+
+/// Options that only an extractor's system reads would be lost without a word.
+void check_effect(const RetargetOptions& o, const SystemType& type) {
+  if (std::count(type.roles.begin(), type.roles.end(), "skeleton") > 0) return;
+  const RetargetOptions plain;
+  for (const auto& [given, name] : {std::pair{o.samples != plain.samples, "--samples"},
+                                    {o.anchor != plain.anchor, "--anchor"},
+                                    {o.min_confidence != plain.min_confidence, "--min-confidence"},
+                                    {o.foot_lock != plain.foot_lock, "--no-foot-lock"},
+                                    {o.keep_limbs != plain.keep_limbs, "--no-keep-limbs"},
+                                    {o.steady_bones != plain.steady_bones, "--no-steady-bones"}})
+    if (given)
+      throw InputError("", std::string(name) + " says nothing to --system " + type.name,
+                       "leave it out");
+}
+
+}  // namespace
+
+void check_options(const RetargetOptions& options, const SystemType& type) {
+  check_effect(options, type);
   if (!(options.min_confidence >= 0 && options.min_confidence <= 1))
     throw InputError("", "--min-confidence is out of range", "give 0 to 1");
   if (options.samples < 1 || options.samples > 256)

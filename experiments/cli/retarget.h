@@ -49,8 +49,8 @@ void add_retarget_options(CommandOptions app, RetargetCommand& c, bool files = t
 void add_target_options(CommandOptions app, RetargetCommand& c);
 void add_weights_options(CommandOptions app, RetargetCommand& c);
 void add_system_options(CommandOptions app, RetargetCommand& c);
-/// InputError naming an option that is out of range.
-void check_options(const RetargetOptions& options);
+/// InputError naming an option that is out of range, or that the system does not read.
+void check_options(const RetargetOptions& options, const SystemType& type);
 /// The doctor's words on a target that would make the result nonsense, unless `force`.
 void check_mesh(const RetargetCommand& c, const TargetMesh& target);
 

@@ -114,7 +114,7 @@ Sink glb_sink(const SinkOptions& options, const Shown& shown) {
     const DistanceSummary surface = writer->surface_error();
     if (surface.max > 0)
       log_info(
-          format("pose offsets, which a skin cannot hold, are left out: the file's surface is "
+          format("what a skin cannot hold is left out: the file's surface is "
                  "%.2f mm from the exact one on average, at most %.2f mm (.h5 and folders are "
                  "exact)",
                  1e3 * surface.mean, 1e3 * surface.max));

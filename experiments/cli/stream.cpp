@@ -43,7 +43,7 @@ struct StreamPlaces {
 constexpr const char* kTcp = "tcp://";
 
 StreamPlaces check_stream(const StreamCommand& c) {
-  check_options(c.how.options);
+  check_options(c.how.options, system_type(c.how.system));
   if (c.seconds && !(*c.seconds > 0 && *c.seconds < 1e9))
     throw InputError("", "--seconds is out of range", "give more than 0 seconds");
   StreamPlaces out;

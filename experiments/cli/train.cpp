@@ -17,6 +17,7 @@
 #include "experiments/observers/loggers.h"
 #include "experiments/scratch.h"
 #include "experiments/shipped_config.h"
+#include "infer/systems.h"
 #include "nn/config/config.h"
 #include "train/run_provenance.h"
 #include "train/stages/motion_stage.h"
@@ -109,6 +110,7 @@ TrainConfig configured(const Request& request) {
   if (config.data.one_mesh && config.data.source != "builtin")
     log_warning("data.one_mesh is for built-in data; those of " + config.data.source +
                 " are taken as they are");
+  system_type(config.evaluation.system, "evaluation.system");
   if (config.stages.empty())
     throw InputError(request.config, "names no stages, so there is nothing to train",
                      "use it in a sweep, or name stages");

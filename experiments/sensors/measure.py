@@ -73,6 +73,43 @@ def box(rng, middle, size, count):
     return middle + points * size
 
 
+def skirt(rng, points, joints, length, flare):
+    """Points under a skirt make way for points of it. `length` in shins and thighs: 1 ends at the knees; `flare`: what each adds to its radius, metres."""
+    legs = joints[[[1, 4, 7], [2, 5, 8]]]  # left and right: hip, knee, ankle
+
+    def at(s):
+        """The middles of both legs."""
+        k = np.minimum(s.astype(int), 1)
+        return [leg[k] + (s - k)[:, None] * (leg[k + 1] - leg[k]) for leg in legs]
+
+    knots = np.linspace(0, length, 21)
+    left, right = at(knots)
+    middle = (left + right) / 2
+    down = middle[-1] - middle[0]
+    down /= np.linalg.norm(down)
+    along = np.maximum.accumulate((middle - middle[0]) @ down)
+    s = np.interp((points - middle[0]) @ down, along, knots, left=-1, right=length + 1)
+    a, b = at(np.clip(s, 0, length))
+    t = np.clip(np.sum((points - a) * (b - a), 1) / np.maximum(np.sum((b - a) ** 2, 1), 1e-9), 0, 1)
+    hidden = (s >= 0) & (s < length) & (np.linalg.norm(points - a - t[:, None] * (b - a), axis=1) < 0.14 + flare * s)
+    count = max(hidden.sum(), 1500)
+    s = length * rng.random(count)
+    a, b = at(s)
+    side = b - a - ((b - a) @ down)[:, None] * down
+    wide = np.linalg.norm(side, axis=1)
+    side /= np.maximum(wide, 1e-6)[:, None]
+    front, radius = np.cross(down, side), 0.14 + flare * s
+    turn = rng.random(count) * (2 * wide + 2 * np.pi * radius)  # along the seam: a straight, a half circle, a straight, a half circle
+    ring = a + side * np.clip(turn, 0, wide)[:, None] + front * radius[:, None]
+    angle = np.clip((turn - wide) / radius, 0, np.pi)
+    around = np.where((turn < wide + np.pi * radius)[:, None], b + radius[:, None] * (np.sin(angle)[:, None] * side + np.cos(angle)[:, None] * front),
+                      a + side * np.clip(2 * wide + np.pi * radius - turn, 0, wide)[:, None] - front * radius[:, None])
+    angle = np.clip((turn - 2 * wide - np.pi * radius) / radius, 0, np.pi)
+    last = a - radius[:, None] * (np.sin(angle)[:, None] * side + np.cos(angle)[:, None] * front)
+    cloth = np.where((turn < wide)[:, None], ring, np.where((turn < 2 * wide + np.pi * radius)[:, None], around, last))
+    return np.concatenate([points[~hidden], cloth])
+
+
 def flying(rng, points, normals, share):
     """Between the person's outline, as a camera at +z sees it, and what is behind: pixels that saw a bit of both."""
     edge = np.flatnonzero(np.abs(normals[:, 2]) < 0.25)
@@ -114,12 +151,19 @@ def clouds(p, effect, seed=0):
         elif effect == "a box beside the foot":
             place = np.array([p.joints[frame, 10, 0] + 0.3, vertices[:, 1].min() + 0.15, p.joints[frame, 10, 2]])
             points = np.concatenate([points, box(rng, place, 0.3, 1500)])
+        elif effect == "a skirt to the knees":
+            points = skirt(rng, points, p.joints[frame], 1.0, 0.10)
+        elif effect == "a long coat":
+            points = skirt(rng, points, p.joints[frame], 1.7, 0.05)
+        elif effect == "somebody 1.5 m beside":
+            points = np.concatenate([points, sample(rng, p.rest + [p.joints[frame, 0, 0] + 1.5, 0, p.joints[frame, 0, 2]], p.faces, POINTS)[0]])
         out.append(points.astype(np.float32))
     return out, factor
 
 
 EFFECTS = ["dense and whole", "noise of 10 mm", "voxels of 8 mm", "voxels of 20 mm", "smoothed surface (TSDF)", "flying pixels, 5 %",
-           "without soles", "without hair (10 cm)", "a stick in the hand", "a box beside the foot", "a child of 1.1 m", "2.1 m"]
+           "without soles", "without hair (10 cm)", "a stick in the hand", "a box beside the foot", "a skirt to the knees",
+           "a long coat", "somebody 1.5 m beside", "a child of 1.1 m", "2.1 m"]
 
 
 def judge(p, effect, weights):
@@ -142,13 +186,14 @@ def main():
     words.add_argument("data", help="benchmark/test.h5")
     words.add_argument("--weights", help="default: the standard weights")
     words.add_argument("--program", default="build/release/restage")
+    words.add_argument("--effects", nargs="*", default=EFFECTS, choices=EFFECTS, metavar="EFFECT", help="only these")
     words.add_argument("--out", required=True, help="a JSON file")
     given = words.parse_args()
     found = {}
     with tempfile.TemporaryDirectory() as folder:
         performances = {f"{clip} {body}": Performance(given.data, body, clip, given.program, f"{folder}/{clip}-{body}")
                         for clip in CLIPS for body in BODIES}
-        for effect in EFFECTS:
+        for effect in given.effects:
             each = {name: judge(p, effect, given.weights) for name, p in performances.items()}
             mean = {key: float(np.mean([one[key] for one in each.values()])) for key in next(iter(each.values()))}
             found[effect] = {"mean": mean, "sequences": each}

@@ -10,7 +10,8 @@ namespace restage::metrics {
 inline Value finite(double x) { return std::isfinite(x) ? Value(x) : std::nullopt; }
 
 inline bool comparable(const Track& a, const Track& b) {
-  return a.present() && b.present() && a.frames > 0 && a.points > 0;
+  return a.present() && b.present() && a.frames > 0 && a.points > 0 && a.frames == b.frames &&
+         a.points == b.points;
 }
 
 inline Eigen::Vector3d apply(const Similarity& map, const Eigen::Vector3d& x) {

@@ -76,7 +76,13 @@ def skeleton(points, weights=None, samples=1, seed=0, device="cpu", joints=None)
     elif np.ndim(points) == 2 if isinstance(points, np.ndarray) else _is_cloud(points):
         return extract(points)
     else:
-        clouds = list(points)
+        try:
+            clouds = list(points)
+        except TypeError:
+            raise _core.InputError(f"restage: {type(points).__name__} is no cloud; give [n, 3] points, a list of them or a path") from None
+    for k, cloud in enumerate(clouds):
+        if cloud is None:
+            raise _core.InputError(f"restage: clouds:{k}: is None, a frame that is missing; leave it out")
     joints = [extract(cloud, f"clouds:{k}") for k, cloud in enumerate(clouds)]
     return np.stack(joints) if joints else np.zeros((0, 22, 3))
 

@@ -1,5 +1,6 @@
 """Config and Run: what a training reads, and what it leaves behind."""
 import collections.abc
+import copy
 import json
 import os
 
@@ -17,7 +18,8 @@ def _words(overrides):
     out = []
     for part in overrides:
         if isinstance(part, collections.abc.Mapping):
-            out += [f"{key}={json.dumps(value, default=_plain)}" for key, value in part.items()]
+            out += [f"{key}={json.dumps(value, default=_plain)}" for key, value in part.items()
+                    if value != {}]  # an empty section changes nothing
         elif isinstance(part, str) and not part.startswith("-"):
             out.append(part)
         else:
@@ -27,7 +29,18 @@ def _words(overrides):
 
 def _plain(value):
     """Paths and NumPy's numbers and arrays."""
-    return value.tolist() if isinstance(value, (np.generic, np.ndarray)) else os.fspath(value)
+    if isinstance(value, (np.generic, np.ndarray)):
+        return value.tolist()
+    if isinstance(value, os.PathLike):
+        return os.fspath(value)
+    raise _core.InputError(f"restage: {value!r} is no value of a configuration; give numbers, text, lists or dicts")
+
+
+def _path(value):
+    try:
+        return os.fspath(value)
+    except TypeError:
+        raise _core.InputError(f"restage: {value!r} is no name of a file; give a str or a path") from None
 
 
 class Config(collections.abc.Mapping):
@@ -39,7 +52,7 @@ class Config(collections.abc.Mapping):
     """
 
     def __init__(self, config, *overrides):
-        self._config = os.fspath(config)
+        self._config = _path(config)
         self._overrides = _words(overrides)
         told = _command("train", self._config, *self._overrides, print_config=True)
         self._text, self._keys = told["config"], told["keys"]
@@ -58,7 +71,7 @@ class Config(collections.abc.Mapping):
             file.write(self._text)
 
     def __getitem__(self, key):
-        return self._keys[key]
+        return copy.deepcopy(self._keys[key])
 
     def __iter__(self):
         return iter(self._keys)
@@ -77,7 +90,7 @@ class Run(str):
     """A training's folder. It is the path itself, so that everything that takes a path takes a Run."""
 
     def __new__(cls, path):
-        path = os.fspath(path)
+        path = _path(path)
         if not os.path.exists(os.path.join(path, "config.yaml")):
             raise _core.InputError(f"restage: {path}: is no folder of a training; give one that 'restage train' made")
         return super().__new__(cls, path)
@@ -104,6 +117,8 @@ class Run(str):
         May be called while the training goes on. pandas.DataFrame(run.curves("motion")) is a table.
         """
         rows = [row for row in self._rows() if row["stage"] == stage]
+        if not rows and stage in self.config["stages"]:  # nothing was logged so far
+            return {"step": np.zeros(0, np.int64)}
         if not rows:
             raise _core.InputError(f"restage: {self}: has no figures of the stage {stage!r}; name one of {self.stages}")
         names = dict.fromkeys(name for row in rows for name, value in row.items()

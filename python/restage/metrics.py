@@ -9,6 +9,7 @@ from . import _core
 
 names = [name for name, *_ in _core.all_metrics()]
 units = {name: unit for name, _, unit, *_ in _core.all_metrics()}
+kinds = {name: kind for name, *_, kind in _core.all_metrics()}
 
 
 def _metric(name, title, unit, text, what):
@@ -40,4 +41,4 @@ def all(pred_joints=None, true_joints=None, pred_vertices=None, true_vertices=No
     return out
 
 
-__all__ = ["all", "names", "units", *names]
+__all__ = ["all", "kinds", "names", "units", *names]

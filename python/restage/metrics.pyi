@@ -2,6 +2,7 @@ import numpy.typing as npt
 
 names: list[str]
 units: dict[str, str]
+kinds: dict[str, str]
 
 def mpjpe(pred: npt.ArrayLike, truth: npt.ArrayLike, joints: npt.ArrayLike | None = None) -> float | None: ...
 def pa_mpjpe(pred: npt.ArrayLike, truth: npt.ArrayLike, joints: npt.ArrayLike | None = None) -> float | None: ...

@@ -40,7 +40,7 @@ class Adapt(CliTest):
         result = self.restage(*call, "--source", "frames/", "--source", "walk/source.h5")
         self.assertEqual(result.code, 0, result.err)
         self.assertEqual(json.loads(result.out)["frames"], {"taught": 85, "held_out": 30, "left_out": 5})
-        self.assertIn("5 frames teach nothing", result.err)
+        self.assertIn("teaching nothing: 5 frames", result.err)
         self.assertIn(names[40], result.err)
         self.assertIsNone(json.loads(result.out)["before"]["confidence"])  # lite does not say how sure it is
         self.bad_input([*call, "--source", "frames/"], "held-out")

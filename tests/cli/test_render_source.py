@@ -118,5 +118,8 @@ class RenderSource(CliTest):
             self.bad_input(["render", "one.ply", *option, "--out", "a.png"], option[0], "--source")
             self.bad_input(["render", "results/r.h5", "--no-source", *option, "--out", "a.png"], option[0])
         self.bad_input(["render", "results/r.h5", "--no-source", "--source", "odd", "--out", "a.png"], "--no-source")
+        for k in range(9):
+            self.ply("longer/f%d.ply" % k, points(50, k))
+        self.bad_input(["render", "results/r.h5", "--no-source", "--truth", "longer", "--out", "a.png"], "longer", "has 9 frames", "the same motion")
         for option in (("--scale", 0), ("--source-up", "w"), ("--fps", 0), ("--fps", "nan"), ("--clip", "Walk")):
             self.bad_input(["render", "results/r.h5", *option, "--out", "a.png"], option[0])

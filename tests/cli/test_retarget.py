@@ -343,6 +343,7 @@ class Register(CliTest):
         bad = lambda *words, **files: self.bad_input(self.call("out.h5", **files), *words)
         bad("none.h5", source="none.h5")
         bad("none.ply", target="none.ply")
+        self.bad_input(self.call("out.h5", "--fps", 60), "60 frames a second", "--system register")
         bad("none.h5", rest="none.h5")
         bad("truth.h5:/joints", "one skeleton", rest="walk/truth.h5")
         bad("distinct points", target=self.ply("few.ply", points(10, 1)))

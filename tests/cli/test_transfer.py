@@ -60,6 +60,8 @@ class Transfer(CliTest):
         self.bad_input(call + ["--out", "x.glb"], "x.glb", "needs a skeleton")
         self.bad_input(call + ["--out", "x.h5"], "x.h5", "end --out in /")
         self.bad_input(call + ["--out", "x/", "--fps", "60"], "60 frames a second")
+        for option in (["--samples", "8"], ["--min-confidence", "0.5"], ["--anchor", "1"], ["--no-foot-lock"], ["--no-keep-limbs"], ["--no-steady-bones"]):
+            self.bad_input(call + ["--out", "x/", *option], option[0] + " says nothing to --system transfer")
         self.bad_input(["retarget", "--force", "--source", "scans", "--target", "hero.ply", "--weights", weights, "--out", "x/"], "no model for skeleton")
 
     def test_a_network_that_needs_correspondence(self):
@@ -87,6 +89,9 @@ class Transfer(CliTest):
         self.bad_input(call + ["data.bodies={train: 1, validation: 1, test: 1}", "transfer.pairs.shuffle=false", "transfer.model=transfer/tst",
                                "transfer.sizes={widths: [8, 8, 8], vertices: 90, code: 8, hidden: 8}"], "made for 90 vertices")
         self.bad_input(call + ["transfer.model=transfer/nbt"], "transfer/npt")
+        self.bad_input(call + ["evaluation.system=transfr"], "evaluation.system", "did you mean 'transfer'")
+        run = self.done(*call, "transfer.optimiser.steps=1", "evaluation.system=h4d").strip()
+        self.bad_input(["eval", "run=" + run], "cannot be judged as evaluation.system=h4d", "no model for codes")
 
 
 if __name__ == "__main__":

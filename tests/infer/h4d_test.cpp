@@ -159,7 +159,12 @@ TEST(H4dSystem, RefusesWhatItCannotUse) {
   const auto refused = [](const auto& f) { return test::refusal_of(f); };
   RetargetOptions fast;
   fast.fps = 60;
-  EXPECT_HAS(refused([&] { h4d_system(fast); }), "60 frames a second");
+  for (const char* system : {"h4d", "transfer", "register"}) {
+    SystemInput input;
+    input.options = fast;
+    EXPECT_HAS(refused([&] { make_system(system_type(system), std::move(input)); }),
+               "60 frames a second");
+  }
   EXPECT_HAS(refused([&] { H4dSystem(codes_of_boxes(), "weights", {}, "target", {}, {}); }),
              "no vertices");
   EXPECT_HAS(refused([&] { H4dSystem({}, "weights", boxes().rest, "target", {}, {}); }), "codes");

@@ -89,6 +89,8 @@ TEST(Metrics, SidesAreSwappedWhereLeftIsNearerToRight) {
   for (double& x : pred) x *= 0.1;
   EXPECT_EQ(side_swaps(track(pred), track(truth)), 0.0);
   EXPECT_FALSE(side_swaps({pred.data(), 4, 11}, {truth.data(), 4, 11}));
+  EXPECT_FALSE(side_swaps({pred.data(), 1, 3}, {truth.data(), 1, 22}));
+  EXPECT_FALSE(mean_distance({pred.data(), 1, 22}, {truth.data(), 2, 22}));
 }
 
 TEST(Metrics, OfWhatIsNoNumberNothingIsSaid) {

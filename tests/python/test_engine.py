@@ -53,9 +53,17 @@ def test_memory_is_shared_and_kept_alive():
 
 def test_read_only_memory_is_not_written_to():
     a = np.frombuffer(bytes(24), np.float32)
-    t = restage.Tensor(a, copy=False)
+    t = restage.Tensor(a)
     t.assign(np.ones(6))
     assert not a.any() and t.numpy().all()
+
+
+@pytest.mark.parametrize("array", [np.frombuffer(bytes(24), np.float32), np.zeros((4, 4), np.float32)[:, ::2], np.zeros(3, ">f4"),
+                                   np.zeros(3, np.float16), [1.0, 2.0]], ids=["read only", "strided", "big-endian", "float16", "list"])
+def test_memory_that_cannot_be_shared_is_refused(array):
+    with pytest.raises(restage.ShapeError, match="cannot be shared"):
+        restage.Tensor(array, copy=False)
+    assert np.array_equal(restage.Tensor(array).numpy(), np.asarray(array))
 
 
 def test_assign():
@@ -475,9 +483,17 @@ def test_config(tmp_path):
     assert dict(restage.Config(tmp_path / "c.yaml")) == dict(other)
     odd = restage.Config("demo", {"data.source": "a #b: [x].h5", "name": "null", "seed": np.int64(5)})
     assert (odd["data.source"], odd["name"], odd["seed"]) == ("a #b: [x].h5", "null", 5)
-    for bad in ("seed=x", "--fast-dev-run", {"motion.optimizer.steps": 1}):
+    for bad in ("seed=x", "--fast-dev-run", {"motion.optimizer.steps": 1}, {"seed": b"3"}, {"seed": object()}):
         with pytest.raises(restage.InputError):
             restage.Config("demo", bad)
+    for nothing in (None, {}, 3):
+        with pytest.raises(restage.InputError, match="no name of a file"):
+            restage.Config(nothing)
+        with pytest.raises(restage.InputError, match="no name of a file"):
+            restage.Run(nothing)
+    config["stages"].append("motion")
+    assert config["stages"] == ["skeleton"], "a Config can be changed"
+    assert dict(config.replaced({"motion": {}})) == dict(config)
 
 
 def test_train(tmp_path):
@@ -499,6 +515,9 @@ def test_train(tmp_path):
         restage.Run(tmp_path / "none")
     with pytest.raises(restage.InputError, match="on_step"):
         restage.train("demo", on_step=3)
+
+    (tmp_path / run / "metrics.jsonl").write_text("")  # as before the first row
+    assert list(run.curves("deformation")) == ["step"] and len(run.curves("deformation")["step"]) == 0
 
     class Enough(Exception):
         pass

@@ -1,6 +1,7 @@
 """Errors: the program's line, for files as for arrays; nothing crashes; Ctrl-C works."""
 import os
 import signal
+import socket
 import threading
 import time
 
@@ -105,6 +106,77 @@ def test_ctrl_c(walk):
     with pytest.raises(KeyboardInterrupt):
         restage.retarget([cloud] * 3000, walk / "target.ply", LITE)
     assert time.monotonic() - start < 30
+
+
+def test_ctrl_c_ends_a_command(walk, tmp_path):
+    """One that has no steps of its own to look between."""
+    with socket.socket() as s:
+        s.bind(("127.0.0.1", 0))
+        port = s.getsockname()[1]
+    timer = threading.Timer(2.0, os.kill, (os.getpid(), signal.SIGINT))
+    start = time.monotonic()
+    timer.start()
+    with pytest.raises(KeyboardInterrupt):
+        restage.command("stream", target=walk / "target.ply", weights=LITE, vmc="127.0.0.1:%d" % port, **{"in": "tcp://127.0.0.1:%d" % port})
+    assert time.monotonic() - start < 30
+
+
+def test_objects_that_are_not_there_yet(walk):
+    class Rig(restage.System):
+        def __init__(self, target):
+            self.count = len(self.faces)
+            super().__init__(target, LITE)
+
+    with pytest.raises(TypeError, match="__init__ was not called"):
+        Rig(walk / "target.ply")
+    for kind, use in ((restage.System, lambda x: x.push(np.zeros((80, 3)))), (restage.System, lambda x: x.source_joints), (restage.Op, lambda x: x(np.zeros(3))),
+                      (restage.Extractor, lambda x: x(np.zeros((80, 3)))), (restage.Var, lambda x: x.numpy()), (restage.Tensor, lambda x: x.numpy()),
+                      (restage.Model, lambda x: x.count()), (restage.Tape, lambda x: x.leaf(np.zeros(3))), (restage.Parameter, lambda x: x.size),
+                      (restage.Gradients, lambda x: x[restage.Parameter([1.0])]), (restage.Frame, lambda x: x.vertices), (restage.Adam, lambda x: x.state_dict()),
+                      (restage.Report, lambda x: bool(x) and x.text)):
+        with pytest.raises((TypeError, RuntimeError, restage.InputError)):
+            use(kind.__new__(kind))
+
+
+def test_threads_are_set_while_others_work(walk):
+    clouds = restage.load_clouds(walk / "source.h5")[:4]
+    expected = restage.retarget(clouds, walk / "target.ply", LITE).joints
+    found = []
+
+    def work():
+        for n in (1, 2, 3) * 3:
+            restage.set_threads(n)
+            found.append(restage.retarget(clouds, walk / "target.ply", LITE).joints)
+
+    threads = [threading.Thread(target=work) for _ in range(2)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    restage.set_threads(0)
+    assert len(found) == 18 and all(np.array_equal(joints, expected) for joints in found)
+
+
+def test_clouds_that_would_be_read_wrongly(walk):
+    cloud = np.asarray(restage.load_clouds(walk / "source.h5")[0], np.float64)
+    system = restage.System(walk / "target.ply", LITE, samples=1)
+    masked = np.ma.masked_array(cloud, np.zeros(cloud.shape, bool))
+    for take in (system.push, lambda c: restage.skeleton(c, LITE), lambda c: restage.retarget([c], walk / "target.ply", LITE)):
+        with pytest.raises(restage.InputError, match="masked"):
+            take(masked)
+        with pytest.raises(restage.InputError, match="km from the origin"):
+            take(cloud + [5.4e6, 0, 0])
+    with pytest.raises(restage.InputError, match="another size"):
+        restage.skeleton(cloud * 1000, LITE)
+    for nothing in (None, 3, [cloud, None]):
+        with pytest.raises(restage.InputError):
+            restage.skeleton(nothing, LITE)
+    for options in ({"samples": 8}, {"anchor": 1.0}, {"foot_lock": False}, {"min_confidence": 0.5}):
+        name = "--" + ("no-" if options == {"foot_lock": False} else "") + next(iter(options)).replace("_", "-")
+        with pytest.raises(restage.InputError, match=name + " says nothing to --system register"):
+            restage.retarget([cloud], walk / "target.ply", LITE, system="register", rest=walk / "rest.h5", **options)
+    with pytest.raises(restage.InputError, match="60 frames a second"):
+        restage.retarget([cloud] * 4, walk / "target.ply", LITE, system="register", rest=walk / "rest.h5", fps=60)
 
 
 def test_ctrl_c_ends_a_training(tmp_path):

@@ -42,7 +42,14 @@ def test_metrics_that_cannot_be():
             shape = (*points, width)
             value = getattr(metrics, name)(np.full(shape, np.nan), np.zeros(shape))
             assert value is None or np.isfinite(value)
-            value = getattr(metrics, name)(rng.normal(size=shape), rng.normal(size=shape), joints=rng.normal(size=(shape[0], 22, 3)))
+            value = getattr(metrics, name)(rng.normal(size=shape), rng.normal(size=shape))
+            assert value is None or np.isfinite(value)
+            more = {"joints": rng.normal(size=(shape[0], 22, 3))}
+            if metrics.kinds[name] != "vertices":
+                with pytest.raises(restage.InputError, match="say nothing to"):
+                    getattr(metrics, name)(rng.normal(size=shape), rng.normal(size=shape), **more)
+                continue
+            value = getattr(metrics, name)(rng.normal(size=shape), rng.normal(size=shape), **more)
             assert value is None or np.isfinite(value)
     for bad in (np.zeros((2, 21, 3)), np.zeros(3), "x", None, np.zeros((2, 22, 2))):
         with pytest.raises(restage.InputError):

@@ -68,7 +68,7 @@ CloudConfig held_out(CloudConfig c, const SkeletonModel& model) {
   c.mirror = false;
   c.scale_jitter = 0;
   c.dressed = c.one_camera = c.camera_ring = c.recombined = c.intruder = c.remembered = c.bend = 0;
-  c.things = c.cut_floor = c.smoothed = 0;
+  c.things = c.cut_floor = c.smoothed = c.skirts = 0;
   c.rotations = true;
   return c;
 }

@@ -32,6 +32,8 @@ void visit(V& v, CloudConfig& c) {
     added("0", between(0, 1)));
   v("smoothed", c.smoothed, "part whose surface a coarse volume has smoothed",
     added("0", between(0, 1)));
+  v("skirts", c.skirts, "part with a skirt, or the lower part of a coat",
+    added("0", between(0, 1)));
   v("remembered", c.remembered, "part with a memory of the frame before", between(0, 1));
   v("frame_step", c.frame_step, "only every so many frames of a motion (30: one a second)",
     between(1, 100000));
