@@ -34,12 +34,17 @@ std::string value_of(const std::string& name, const py::handle& value) {
   return bytes_of(py::str(value), "'" + name + "'");
 }
 
+/// Whether the name of a value's type begins so ("numpy.bool_", and "numpy.bool" from NumPy 2 on).
+bool of_numpy(const py::handle& value, const char* type) {
+  return std::string_view(Py_TYPE(value.ptr())->tp_name).starts_with(type);
+}
+
 void append_words(const std::string& name, const py::handle& value,
                   std::vector<std::string>& words) {
   const bool on_without = name == "foot-lock" || name == "steady-bones";
   if (value.is_none()) return;
-  if (PyBool_Check(value.ptr())) {
-    const bool yes = value.ptr() == Py_True;
+  if (PyBool_Check(value.ptr()) || of_numpy(value, "numpy.bool")) {
+    const bool yes = PyObject_IsTrue(value.ptr()) == 1;
     if (on_without && !yes) words.push_back("--no-" + name);
     if (!on_without && yes) words.push_back("--" + name);
   } else if (PyList_Check(value.ptr()) || PyTuple_Check(value.ptr())) {

@@ -1,6 +1,8 @@
 // restage.train: the command, with a function that is called after every step.
 #include "experiments/cli/train.h"
 
+#include <atomic>
+
 #include "autograd/base/interrupt.h"
 #include "python/bind.h"
 
@@ -32,7 +34,24 @@ class StepWatch final : public TrainObserver {
   py::object on_step_;
 };
 
+/// Trainings of one process would write into one another's logs.
+class OneAtATime {
+ public:
+  OneAtATime() {
+    if (busy_.exchange(true))
+      throw InputError("", "another training is going on in this process",
+                       "wait for it, or train in processes of their own");
+  }
+  ~OneAtATime() { busy_ = false; }
+  OneAtATime(const OneAtATime&) = delete;
+  OneAtATime& operator=(const OneAtATime&) = delete;
+
+ private:
+  static inline std::atomic<bool> busy_{false};
+};
+
 std::string run(const py::args& arguments, const py::dict& options, const py::object& on_step) {
+  const OneAtATime alone;
   std::vector<std::string> words = words_of(options);
   for (const py::handle word : arguments) {
     const bool path = PyObject_HasAttrString(word.ptr(), "__fspath__");

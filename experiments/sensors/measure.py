@@ -155,15 +155,13 @@ def clouds(p, effect, seed=0):
             points = skirt(rng, points, p.joints[frame], 1.0, 0.10)
         elif effect == "a long coat":
             points = skirt(rng, points, p.joints[frame], 1.7, 0.05)
-        elif effect == "somebody 1.5 m beside":
-            points = np.concatenate([points, sample(rng, p.rest + [p.joints[frame, 0, 0] + 1.5, 0, p.joints[frame, 0, 2]], p.faces, POINTS)[0]])
         out.append(points.astype(np.float32))
     return out, factor
 
 
 EFFECTS = ["dense and whole", "noise of 10 mm", "voxels of 8 mm", "voxels of 20 mm", "smoothed surface (TSDF)", "flying pixels, 5 %",
            "without soles", "without hair (10 cm)", "a stick in the hand", "a box beside the foot", "a skirt to the knees",
-           "a long coat", "somebody 1.5 m beside", "a child of 1.1 m", "2.1 m"]
+           "a long coat", "a child of 1.1 m", "2.1 m"]
 
 
 def judge(p, effect, weights):

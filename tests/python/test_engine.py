@@ -519,6 +519,12 @@ def test_train(tmp_path):
     (tmp_path / run / "metrics.jsonl").write_text("")  # as before the first row
     assert list(run.curves("deformation")) == ["step"] and len(run.curves("deformation")["step"]) == 0
 
+    def nested(stage, done, figures):
+        restage.train(config)
+
+    with pytest.raises(restage.InputError, match="another training is going on"):
+        restage.train(config, on_step=nested)
+
     class Enough(Exception):
         pass
 

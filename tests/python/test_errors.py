@@ -171,6 +171,7 @@ def test_clouds_that_would_be_read_wrongly(walk):
     for nothing in (None, 3, [cloud, None]):
         with pytest.raises(restage.InputError):
             restage.skeleton(nothing, LITE)
+    restage.retarget([cloud], walk / "target.ply", LITE, foot_lock=np.bool_(False))
     for options in ({"samples": 8}, {"anchor": 1.0}, {"foot_lock": False}, {"min_confidence": 0.5}):
         name = "--" + ("no-" if options == {"foot_lock": False} else "") + next(iter(options)).replace("_", "-")
         with pytest.raises(restage.InputError, match=name + " says nothing to --system register"):
