@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <memory>
 
+#include "autograd/base/interrupt.h"
 #include "autograd/base/log.h"
 #include "datasets/benchmark/recipe.h"
 #include "datasets/benchmark/sequence.h"
@@ -90,8 +91,10 @@ Prediction retargeted(const Bundle& weights, const std::string& folder, const st
       ++out.frames;
     }
   };
-  for (int64_t i = 0; const auto frame = frames->next(); ++i)
+  for (int64_t i = 0; const auto frame = frames->next(); ++i) {
+    throw_if_stopped();
     if (i % how.every == 0) keep_all(system->push(frame->points, frame->source));
+  }
   keep_all(system->finish());
   out.vertex_count = static_cast<int64_t>(system->target().vertices.size());
   return out;

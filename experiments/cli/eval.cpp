@@ -31,6 +31,8 @@ using File = PredictionFile;
 
 void check_pair(const File& pred, const File& truth) {
   check_same_frames(pred, truth);
+  for (const File* file : {&pred, &truth})  // frames are compared in their order
+    for (const std::string& remark : file->remarks) log_warning(file->path + ": " + remark);
   const bool joints = pred.joints().present() && truth.joints().present();
   const bool vertices = pred.vertices().present() && truth.vertices().present();
   if (vertices && pred.data.vertex_count != truth.data.vertex_count)

@@ -96,7 +96,9 @@ BenchmarkOptions benchmark_options(const TrainConfig& config) {
 Json evaluate_benchmark(const Bundle& models, const Evaluate& evaluate, const TrainConfig& config) {
   const BenchmarkOptions how = benchmark_options(config);
   Json out = Json::object();
+  SlowWork slow;
   for (const std::string& set : evaluate.sets) {
+    slow.on("measuring on the set '" + set + "'");
     std::vector<std::string> names;
     const SystemScores scores =
         evaluate_benchmark_set(models, evaluate.benchmark, set, how, &names);

@@ -1,6 +1,7 @@
 """restage eval."""
 import math
 import os
+import shutil
 
 from support import CliTest, numbers
 
@@ -191,6 +192,12 @@ class Eval(CliTest):
         bad("few", "few", "has 5 frames", "has 6")
         self.meshes("gap", [0, 1, 3, 4, 5])
         bad("gap", "has 5 frames", "missing after gap/1.obj")
+        self.meshes("gap", [3])
+        os.rename(self.path("gap/3.obj"), self.path("gap/9.obj"))
+        shutil.copy(self.path("gap/5.obj"), self.path("gap/3.obj"))
+        told = self.restage("eval", "--pred", "gap", "--truth", "truth.h5")
+        self.assertEqual(told.code, 0, told.err)
+        self.assertIn("warning: gap: frames are missing after gap/1.obj", told.err)
         self.meshes("other", vertices=V - 1)
         bad("other", "11 vertices", "truth.h5 has 12")
         self.meshes("mixed", range(3))
