@@ -74,14 +74,15 @@ HostSignals::~HostSignals() { host = outer_; }
 
 bool stop_requested() {
   if (caught.load() != 0 || asked.load()) return true;
-  if (host != nullptr && (*host)()) asked = true;
-  return asked.load();
+  if (host == nullptr || !(*host)()) return false;
+  ask_to_stop();  // other threads have no host
+  return true;
 }
 
 void throw_if_stopped() {
   if (!stop_requested()) return;
-  if (const int signal = caught.load(); signal != 0) throw Interrupted(signal);
-  if (asked.load()) throw Interrupted(SIGTERM);
+  const int signal = caught.load();
+  throw Interrupted(signal != 0 ? signal : SIGTERM);
 }
 
 }  // namespace restage

@@ -5,8 +5,8 @@
 #include <map>
 #include <set>
 
-#include "autograd/base/interrupt.h"
 #include "autograd/base/atomic_file.h"
+#include "autograd/base/interrupt.h"
 #include "autograd/base/log.h"
 #include "autograd/base/temporary.h"
 #include "datasets/benchmark/characters.h"
