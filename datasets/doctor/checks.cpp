@@ -51,18 +51,17 @@ std::string up_advice(int up, const std::string& given) {
   return own == Axis::y ? "leave --source-up out" : "give --source-up " + to_string(own);
 }
 
-/// float32 holds coordinates to a centimetre up to here.
+/// float32 holds coordinates to a centimetre up to here. A stray point may be anywhere, so all
+/// points have to be far away.
 void check_near(const Points& frame, const std::string& where) {
   constexpr float kFar = 100'000;
-  if (frame.empty()) return;
-  const float far = frame.front().cwiseAbs().maxCoeff();
-  if (far > kFar)
-    throw InputError(
-        where,
-        "lies " + number(1e-3 * far) +
-            " km from the origin, where single precision loses centimetres",
-        "subtract the same origin from all frames, give the unit with --scale, or --force "
-        "to take it as it is");
+  const auto is_far = [](const Point& p) { return p.cwiseAbs().maxCoeff() > kFar; };
+  if (frame.empty() || !std::all_of(frame.begin(), frame.end(), is_far)) return;
+  throw InputError(where,
+                   "lies " + number(1e-3 * frame.front().cwiseAbs().maxCoeff()) +
+                       " km from the origin, where single precision loses centimetres",
+                   "subtract the same origin from all frames, give the unit with --scale, or "
+                   "--force to take it as it is");
 }
 
 }  // namespace

@@ -19,7 +19,7 @@ def _words(overrides):
     for part in overrides:
         if isinstance(part, collections.abc.Mapping):
             out += [f"{key}={json.dumps(value, default=_plain)}" for key, value in part.items()
-                    if value != {}]  # an empty section changes nothing
+                    if not (isinstance(value, collections.abc.Mapping) and not value)]  # an empty section changes nothing
         elif isinstance(part, str) and not part.startswith("-"):
             out.append(part)
         else:

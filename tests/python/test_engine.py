@@ -494,6 +494,7 @@ def test_config(tmp_path):
     config["stages"].append("motion")
     assert config["stages"] == ["skeleton"], "a Config can be changed"
     assert dict(config.replaced({"motion": {}})) == dict(config)
+    assert config.replaced({"stages": np.array(["skeleton", "motion"])})["stages"] == ["skeleton", "motion"]
 
 
 def test_train(tmp_path):

@@ -166,6 +166,9 @@ def test_clouds_that_would_be_read_wrongly(walk):
             take(masked)
         with pytest.raises(restage.InputError, match="km from the origin"):
             take(cloud + [5.4e6, 0, 0])
+    stray = cloud.copy()
+    stray[0] = 3e5
+    assert system.push(stray) is not None, "one point far away is no cloud far away"
     with pytest.raises(restage.InputError, match="another size"):
         restage.skeleton(cloud * 1000, LITE)
     for nothing in (None, 3, [cloud, None]):
