@@ -58,7 +58,7 @@ class PySystem {
       (*to_ours_)(cloud);
       if (!c_.options.force) {
         check_frame(cloud, name);
-        up_->look(cloud, name);
+        watch_->look(cloud, name);
       }
       const std::span<const RetargetedFrame> made = system_->push(cloud, name);
       frame_seconds_ =
@@ -115,7 +115,7 @@ class PySystem {
   void make(const cli::Common& common) {
     cli::check_options(c_.options, system_type(c_.system));
     to_ours_.emplace(c_.source.scale, c_.source.up);
-    up_.emplace(SourceFrame{c_.source.scale, c_.source.up});
+    watch_.emplace(SourceFrame{c_.source.scale, c_.source.up});
     if (c_.source.fps && !(*c_.source.fps >= 1 && *c_.source.fps <= 1000))
       throw InputError("", "--fps is out of range",
                        "give the clouds' frames per second, 1 to 1000");
@@ -144,7 +144,7 @@ class PySystem {
   double frame_seconds_ = 0;  // of C++ in the last push
   cli::RetargetCommand c_;
   std::optional<ToOurs> to_ours_;
-  std::optional<UpWatch> up_;
+  std::optional<SourceWatch> watch_;
   std::unique_ptr<System> system_;
 };
 

@@ -109,21 +109,31 @@ void check_target(const Mesh& target, const std::string& where, ExamineOptions o
   }
 }
 
-void UpWatch::look(const Points& cloud, const std::string& where) {
-  if (first_.size() < kSourceFrames && cloud.size() >= kEnoughPoints) {
-    first_.push_back({cloud, {}});
-    if (first_.size() == kSourceFrames) {
-      Given frames(first_);
-      const Diagnosis d = examine_frames(frames);
-      const Finding* up = d.find("up");
-      if (up != nullptr && up->weight == Weight::wrong && up->sure >= kVerySure) {
-        wrong_ = *up;
-        fix_ = up_advice(d.orientation.up, given_.up);
-      }
-      for (Mesh& m : first_) m = {};
+void SourceWatch::look(const Points& cloud, const std::string& where) {
+  if (!settled_ && cloud.size() >= kEnoughPoints) clouds_.push_back({cloud, {}});
+  if (clouds_.size() == kSourceFrames) judge();
+  if (wrong_) refuse(where, *wrong_, fix_);
+}
+
+void SourceWatch::judge() {
+  Given frames(clouds_);
+  const Diagnosis d = examine_frames(frames);
+  clouds_.clear();
+  wrong_.reset();
+  settled_ = true;
+  for (const Finding& f : d.findings) {
+    if (f.weight != Weight::wrong) continue;
+    if (f.topic == "up" && f.sure >= kVerySure) {
+      wrong_ = f;
+      fix_ = up_advice(d.orientation.up, given_.up);
+      return;
+    }
+    if (f.topic == "others" || f.topic == "plane") {
+      wrong_ = f;
+      fix_ = "let one person alone be in the clouds (restage doctor --fix mends recorded ones)";
+      settled_ = false;
     }
   }
-  if (wrong_) refuse(where, *wrong_, fix_);
 }
 
 bool may_be_a_person(const Points& frame) {

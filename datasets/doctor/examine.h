@@ -104,17 +104,24 @@ void check_source(const std::vector<Mesh>& first_frames, const std::string& wher
                   const SourceFrame& given = {});
 void check_target(const Mesh& target, const std::string& where, ExamineOptions options = {});
 
-/// What check_source() says of the up axis, for a source that comes cloud by cloud.
-class UpWatch {
+/// What check_source() says of the up axis, of a second person and of floors, for a source that
+/// comes cloud by cloud.
+class SourceWatch {
  public:
-  explicit UpWatch(SourceFrame given = {}) : given_(std::move(given)) {}
+  explicit SourceWatch(SourceFrame given = {}) : given_(std::move(given)) {}
   /// Takes the next cloud, already in metres, y up, as given. InputError with the kSourceFrames-th
-  /// cloud and each one after it, where these clouds stand up along another axis.
+  /// cloud and those after it: for good where these clouds stand up along another axis; where they
+  /// show more than one person, until as many clouds in a row show no more. Then it looks no more.
   void look(const Points& cloud, const std::string& where);
+  /// The clouds stand up along another axis: no cloud that follows will be better.
+  bool hopeless() const { return settled_ && wrong_; }
 
  private:
+  void judge();
+
   SourceFrame given_;
-  std::vector<Mesh> first_;
+  std::vector<Mesh> clouds_;
+  bool settled_ = false;
   std::optional<Finding> wrong_;
   std::string fix_;
 };

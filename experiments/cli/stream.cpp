@@ -128,7 +128,7 @@ class Stream {
          live::Mailbox& box, live::Words& words)
       : c_(c),
         to_ours_(c.how.source.scale, c.how.source.up),
-        up_({c.how.source.scale, c.how.source.up}),
+        watch_({c.how.source.scale, c.how.source.up}),
         system_(system),
         vmc_(vmc),
         page_(page),
@@ -197,19 +197,18 @@ class Stream {
     thin();
     to_ours_(cloud_.points);
     try {
-      if (!c_.how.options.force) check_frame(cloud_.points, cloud_.name);
+      if (!c_.how.options.force) {
+        check_frame(cloud_.points, cloud_.name);
+        watch_.look(cloud_.points, cloud_.name);
+      }
       const auto made = system_.push(cloud_.points, cloud_.name);
       missed_ = told_ = 0;
       going_ = true;
       if (!made.empty()) send(made.back());
-    } catch (const UnusableCloud& fault) {
-      leave_out(fault);
     } catch (const InputError& fault) {
+      if (watch_.hopeless()) throw;  // so the program ends
       leave_out(fault);
-      return;
     }
-    // No cloud that follows would be better, so the program ends.
-    if (!c_.how.options.force) up_.look(cloud_.points, cloud_.name);
   }
 
   /// More points than a network looks at cost time and say nothing new.
@@ -254,7 +253,7 @@ class Stream {
 
   const StreamCommand& c_;
   const ToOurs to_ours_;
-  UpWatch up_;
+  SourceWatch watch_;
   System& system_;
   live::VmcSender& vmc_;
   live::PageServer* page_;

@@ -243,13 +243,34 @@ class Streams(StreamTest):
             for k, points in enumerate(self.clouds[:8]):
                 process.stdin.write(frame(k / 30, [(x, -z, y) for x, y, z in points]))
                 process.stdin.flush()
-                self.assertIsNotNone(self.receiver.next())
+                if given or k < 7:
+                    self.assertIsNotNone(self.receiver.next())
             out, err = process.communicate(timeout=30)
             if given:
                 self.assertEqual(process.returncode, 0, err)
             else:
                 self.assertEqual((process.returncode, out), (2, b""), err)
                 self.assertIn("give --source-up z, or --force", err.decode().splitlines()[-1])
+
+    def test_a_second_person_who_leaves(self):
+        process = self.stream("-")
+
+        def send(k, points):
+            process.stdin.write(frame(k / 30, points))
+            process.stdin.flush()
+
+        for k, points in enumerate(self.clouds[:8]):
+            send(k, points + [(x + 1.5, y, z) for x, y, z in points])
+            if k < 7:
+                self.assertIsNotNone(self.receiver.next())
+        for k in range(8, 300):
+            send(k, self.clouds[k % len(self.clouds)])
+            if self.receiver.next(0.1) is not None:
+                break
+        document, err = self.ended(process)
+        self.assertEqual(document["dropped_because"]["unusable"], 8, err)
+        self.assertIn("a second person", err)
+        self.assertIn("let one person alone be in the clouds", err)
 
     def test_without_standard_input(self):
         command = '"$@" <&-'

@@ -76,6 +76,17 @@ def test_clouds_whose_z_points_up(walk):
     assert all(s.push(c) for s in (upright, forced) for c in lying)
 
 
+def test_a_second_person_who_leaves(walk):
+    alone = [np.asarray(c) for c in restage.load_clouds(walk / "source.h5")][:8]
+    both = [np.concatenate([c, c + np.float32([1.5, 0, 0])]) for c in alone]
+    system = restage.System(walk / "target.ply", LITE, samples=1)
+    assert all(system.push(c) for c in both[:7])
+    for cloud in [both[7], *alone[:7]]:
+        with pytest.raises(restage.InputError, match="a second person .* let one person alone be in the clouds"):
+            system.push(cloud)
+    assert system.push(alone[7]) and system.push(both[0])
+
+
 def test_bad_sources(walk):
     for bad in (3, [], [np.zeros((5, 2))], np.zeros((3, 3)), [None], object()):
         with pytest.raises(restage.InputError):
