@@ -123,7 +123,7 @@ void add_attention(py::module_& m) {
         return without_tape([&] { return knn(q, p, k); });
       },
       py::arg("query"), py::arg("points"), py::arg("k"),
-      "int32 [n, m, k]: the k nearest of points [n, v, 3] to each of query [n, m, 3].");
+      "int32 [n, m, min(k, v)]: the nearest of points [n, v, 3] to each of query [n, m, 3].");
   m.def(
       "fps",
       [](const O& points, int64_t count) {

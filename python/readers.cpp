@@ -1,7 +1,10 @@
 // Files that the program reads, as arrays: meshes, clouds, motions.
+#include <variant>
+
 #include "datasets/importers/skeleton_take.h"
 #include "datasets/readers/frame_folder.h"
 #include "datasets/readers/mesh_io.h"
+#include "experiments/cli/source_options.h"
 #include "experiments/source.h"
 #include "python/arrays.h"
 
@@ -19,12 +22,13 @@ py::tuple mesh(const py::object& path) {
 }
 
 /// Of a file or a folder of clouds, all that can be read; None where a frame cannot.
-py::list clouds(const py::object& path, const std::optional<int64_t>& sequence, double scale,
-                const std::string& up) {
+py::list clouds(const py::object& path, const std::optional<int64_t>& sequence,
+                const std::variant<double, std::string>& scale, const std::string& up) {
   SourceRecord how;
   how.path = path_of(path);
   how.sequence = sequence;
-  how.scale = scale;
+  const auto* unit = std::get_if<std::string>(&scale);
+  how.scale = unit != nullptr ? cli::metres_per_unit(*unit) : std::get<double>(scale);
   how.up = up;
   std::vector<std::optional<Points>> read;
   Watch watch;

@@ -53,15 +53,17 @@ std::string up_advice(int up, const std::string& given) {
 
 /// float32 holds coordinates to a centimetre up to here. A stray point may be anywhere, so all
 /// points have to be far away.
-void check_near(const Points& frame, const std::string& where) {
+void check_near(const Points& frame, const std::string& where, FrameOptions options) {
   constexpr float kFar = 100'000;
   const auto is_far = [](const Point& p) { return p.cwiseAbs().maxCoeff() > kFar; };
   if (frame.empty() || !std::all_of(frame.begin(), frame.end(), is_far)) return;
   throw InputError(where,
                    "lies " + number(1e-3 * frame.front().cwiseAbs().maxCoeff()) +
                        " km from the origin, where single precision loses centimetres",
-                   "subtract the same origin from all frames, give the unit with --scale, or "
-                   "--force to take it as it is");
+                   std::string("subtract the same origin from all frames") +
+                       (options == FrameOptions::scale_and_force
+                            ? ", give the unit with --scale, or --force to take it as it is"
+                            : ""));
 }
 
 }  // namespace
@@ -71,7 +73,7 @@ void check_source(const std::vector<Mesh>& first_frames, const std::string& wher
   for (const Mesh& frame : first_frames)
     if (frame.vertices.size() < kEnoughPoints) return;  // refused when its turn comes
   if (first_frames.empty()) return;
-  check_near(first_frames.front().vertices, where);
+  check_near(first_frames.front().vertices, where, FrameOptions::scale_and_force);
   Given frames(first_frames);
   const Diagnosis d = examine_frames(frames);
   const bool some_odd = !std::all_of(first_frames.begin(), first_frames.end(),
@@ -143,14 +145,16 @@ bool may_be_a_person(const Points& frame) {
          is_person_sized(size / kRoom);
 }
 
-void check_frame(const Points& frame, const std::string& where) {
-  check_near(frame, where);
+void check_frame(const Points& frame, const std::string& where, FrameOptions options) {
+  check_near(frame, where, options);
   if (may_be_a_person(frame)) return;
   throw InputError(where,
                    "is of another size than people: half of its points lie within " +
                        number(normalised(frame).size) + " m of the middle",
-                   "give all frames in metres (--scale), leave this one out, or --force to take it "
-                   "as it is");
+                   options == FrameOptions::scale_and_force
+                       ? "give all frames in metres (--scale), leave this one out, or --force to "
+                         "take it as it is"
+                       : "give metres (restage doctor --fix OUT makes metres of files)");
 }
 
 }  // namespace restage

@@ -128,6 +128,10 @@ class SourceWatch {
 
 /// Cheaply, of any frame: whether it is of a person's size, in metres.
 bool may_be_a_person(const Points& frame);
-void check_frame(const Points& frame, const std::string& where);
+/// InputError where it is not, or is so far away that float32 loses centimetres. `options`: which
+/// of them the message can name.
+enum class FrameOptions { scale_and_force, none };
+void check_frame(const Points& frame, const std::string& where,
+                 FrameOptions options = FrameOptions::scale_and_force);
 
 }  // namespace restage

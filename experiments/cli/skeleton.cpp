@@ -6,6 +6,7 @@
 #include "autograd/base/log.h"
 #include "autograd/base/output_check.h"
 #include "autograd/kernels/kernel.h"
+#include "datasets/doctor/examine.h"
 #include "datasets/readers/frame_folder.h"
 #include "datasets/schema.h"
 #include "experiments/cli/commands.h"
@@ -92,6 +93,7 @@ int run_skeleton(const SkeletonOptions& given, const Common& common) {
   std::vector<double> sure;
   while (const auto frame = frames->next()) {
     if (frame->fault) throw *frame->fault;
+    check_frame(frame->points, frame->source, FrameOptions::none);
     left_out += frame->left_out;
     SeenJoints seen = extract(frame->points, frame->source, key);
     if (seen.uncertainty) sure.push_back(confidence(*seen.uncertainty));

@@ -42,7 +42,7 @@ def load_cloud(path):
 def load_clouds(path, sequence=None, scale=1.0, up="y"):
     """The clouds of a file (HDF5, NPZ, NPY) or folder, as retarget() reads them: a list of float32 [n, 3], metres.
 
-    A frame that cannot be read is None. scale: metres per unit; up: the axis that points up.
+    A frame that cannot be read is None. scale: metres per unit, or "mm", "cm" ...; up: the axis that points up.
     """
     return _core.load_clouds(path, sequence, scale, up)
 

@@ -112,6 +112,7 @@ class BadClouds(Skeleton):
         bad(self.ply("huge.ply", [(3e38 * (-1) ** i, 3e38, z) for i, (_, _, z) in enumerate(self.cloud)]))
         bad(self.ply("face.ply", self.cloud, [(0, 1, 300)]), "face")
         bad(self.write("what.xyz", "1 2 3\n"))
+        bad(self.ply("mm.ply", [(1e3 * x, 1e3 * y, 1e3 * z) for x, y, z in self.cloud]), "another size", "doctor --fix")
         self.bad("x" * 3000)
 
     def test_later_frames(self):

@@ -91,6 +91,7 @@ class Runs(Train):
         for words, part in ((["skeleton.from=nowhere"], "nowhere"), (["deformation.from=" + first], "no model for deformation.weights"),
                             (["motion.init=" + first, "motion.sizes.hidden=8"], "smrm.enc.weight_ih_l0"),
                             (["motion.init=" + first, "motion.init_names=[smrm.encoder.*]"], "smrm.encoder.*"),
+                            (["motion.init=" + first, "motion.init_names=[]"], "init_names is empty"),
                             (["motion.init=" + first, "motion.from=" + first], "motion.init")):
             self.bad_input(["train", "tiny.yaml", *words], part)
 

@@ -62,6 +62,12 @@ def test_bad_clouds(walk, bad):
     assert np.array_equal(system.push(good).vertices, before)
 
 
+def test_an_extractor_names_no_option_that_it_lacks(walk):
+    cloud = np.asarray(restage.load_cloud(walk / "target.ply"))
+    with pytest.raises(restage.InputError, match="give metres .restage doctor --fix OUT"):
+        restage.Extractor(LITE)(1000 * cloud)
+
+
 def test_clouds_whose_z_points_up(walk):
     clouds = [np.asarray(c) for c in restage.load_clouds(walk / "source.h5")]
     lying = [np.stack([c[:, 0], -c[:, 2], c[:, 1]], axis=1) for c in clouds]

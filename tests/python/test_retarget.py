@@ -55,6 +55,14 @@ def test_clouds_in_memory(walk, source, truth, tmp_path):
         assert np.array_equal(f["vertices"][:], truth[0]["vertices"])
 
 
+def test_units_by_name(source):
+    metres = restage.load_clouds(source)[0]
+    for scale in ("mm", 0.001, np.float32(0.001), "0.001"):
+        assert np.allclose(restage.load_clouds(source, scale=scale)[0], 0.001 * metres, atol=1e-6)
+    with pytest.raises(restage.InputError, match="give metres per unit"):
+        restage.load_clouds(source, scale="stone")
+
+
 def test_none_is_a_missing_frame(walk, source, truth):
     clouds = restage.load_clouds(source)
     clouds[2] = None
