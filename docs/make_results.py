@@ -289,7 +289,7 @@ PA-MPVD. "Source unchanged" hands on the source's true skeleton.
 
 {glance}
 
-* Seeds share the extractor's first look and the skinning. So the true spread is larger
+* Seeds share two of the networks' parts. So the true spread is larger
   ([each seed](notes/results_log.md#seeds-calm-and-fitting-as-the-page-had-them)). Seed 1 is shipped.
 * **The tables are of sweeps, which do not [hold bones](real_scans.md#one-person-is-one-skeleton) and do not [keep the
   names of limbs](real_scans.md#limbs-that-cross-keep-their-names).** `retarget` does both. The
@@ -312,7 +312,7 @@ late](#two-frames-late), {lite_count} of lite, one of the others. "Is told": wha
 
 {calm_table}
 
-* A rule makes the truth. The closed form follows nearly the same rule with true joints: it is near the best possible.
+* A rule makes the truth. The closed form follows nearly the same rule with true joints: its joints are near the best.
 * Alignment removes place, turn and size, so "source unchanged" looks good in PA-MPJPE. MPJPE shows the difference.
 * "Lite" is of an earlier program ([surface and calm](notes/results_log.md#rows-and-tables-that-the-page-had)).
 
@@ -320,9 +320,9 @@ late](#two-frames-late), {lite_count} of lite, one of the others. "Is told": wha
 
 ## Is a difference real?
 
-Differences are paired over seeds and sequences, with [95 % intervals](metrics.md#when-is-a-difference-real), which err
+Differences, before rounding, are paired over seeds and sequences, with [95 % intervals](metrics.md#when-is-a-difference-real), which err
 more often where seeds or sequences are few. Bold: the interval does not contain zero. A negative difference is better.
-"Less in": in how many sequences.
+"Less in": of the sequences.
 
 In [a training of a quarter of the steps](reproduction/ours.md) the motion network's gain in PA-MPJPE cannot be told.
 

@@ -119,12 +119,14 @@ gradcheck::OpSamples op_samples() {
 /// A stage with a loss of its own: points count by their distances, far-off ones little.
 struct ShiftStageConfig {
   ModelChoice model{"mine/shift"};
+  double weight = 1;
   OptimiserConfig optimiser;
 };
 
 template <class V>
 void visit(V& v, ShiftStageConfig& c) {
   visit_choice(v, c.model);
+  v("weight", c.weight, "of the loss", at_least(0));
   v("optimiser", c.optimiser, "steps, batch, rate");
 }
 
@@ -134,6 +136,7 @@ class ShiftStage final : public Stage {
   static std::vector<std::string> reads(const Config&) { return {}; }
   ShiftStage(const Config& c, const StageInput& in)
       : Stage("shift", c.optimiser, in.device),
+        weight_(c.weight),
         model_(add_network<TransferModel>(c.model, RngKey{in.seed, 0}, {{"points", "20"}})),
         optimiser_(add_optimiser("optimiser", {"transfer"}, c.optimiser)),
         sampler_(in.train, {.points = 20, .vertices = 40}, in.seed) {}
@@ -143,7 +146,8 @@ class ShiftStage final : public Stage {
     const Differentiated d =
         differentiate(RngKey{1, static_cast<uint64_t>(step)}, [&](Context& ctx) {
           const Var made = model_->forward(ctx, {b.pose, b.identity});
-          return mean_all(geman_mcclure(smooth_length(made - Var(b.truth), 1e-8)));
+          const Var loss = mean_all(geman_mcclure(smooth_length(made - Var(b.truth), 1e-8)));
+          return scale(loss, weight_);
         });
     optimiser_->step(d.gradients, learning_rate(optimisation_.schedule, step, steps()));
     return {{"loss", d.loss}};
@@ -154,6 +158,7 @@ class ShiftStage final : public Stage {
   NamedValues validate() override { return {{"loss", 0}}; }
 
  private:
+  double weight_;
   TransferModel* model_;
   Optimiser* optimiser_;
   TransferSampler sampler_;
