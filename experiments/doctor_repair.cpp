@@ -8,6 +8,7 @@
 #include "autograd/base/atomic_file.h"
 #include "autograd/base/error.h"
 #include "autograd/base/format.h"
+#include "autograd/base/interrupt.h"
 #include "datasets/readers/errors.h"
 #include "datasets/readers/mesh_io.h"
 #include "experiments/doctor_carry.h"
@@ -138,6 +139,7 @@ void mend_frames(const Subject& subject, const Diagnosis& d, Mender& mend, Sink&
   std::optional<Mesh> previous;
   int64_t sequence = 0, row = -1, row_before = -1;  // of the source, where empty frames count too
   for (int64_t i = 0; const auto frame = subject.frames->next(); ++i) {
+    throw_if_stopped();
     row += 1 + frame->missing;
     if (frame->sequence != sequence) {
       sink.end_sequence();

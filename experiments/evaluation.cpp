@@ -1,5 +1,6 @@
 #include "experiments/evaluation.h"
 
+#include "autograd/base/interrupt.h"
 #include "infer/transfer.h"
 #include "nn/geometry/closed_form.h"
 #include "train/stages/skeleton_stage.h"
@@ -251,6 +252,11 @@ SystemEvaluation evaluate_system(const Bundle& weights, const std::string& weigh
   if (type.parts && weights.find("motion") != nullptr &&
       weights.find("deformation.weights") == nullptr)
     out.missing.push_back("surfaces: no model for deformation.weights");
+  if (out.conditions.empty() && !(type.parts && weights.find("skeleton") != nullptr))
+    throw InputError(
+        weights_name,
+        "cannot be judged as evaluation.system=" + type.name + ": " + out.missing.front(),
+        "name the system of these weights, or train what is missing");
   RetargetOptions how;
   how.seed = options.seed;
   how.force = true;  // a badly extracted target counts with its error instead of ending the table
@@ -259,6 +265,7 @@ SystemEvaluation evaluate_system(const Bundle& weights, const std::string& weigh
   how.keep_limbs = options.keep_limbs;
   how.any_size = options.any_size;
   for (const EvalSequence& sequence : options.sequences) {
+    throw_if_stopped();
     const Performance performance(corpus, sequence, options.scans, options.seed);
     Sequence truth = truth_of(performance, options.every);
     const Body& target = performance.target();
@@ -293,11 +300,6 @@ SystemEvaluation evaluate_system(const Bundle& weights, const std::string& weigh
     for (auto& reference : scores.references) metrics::average(&reference.second);
   }
   if (type.parts) judge_extractor(weights, corpus, options.clouds, &out);
-  if (out.conditions.empty() && !out.joint_error)
-    throw InputError(
-        weights_name,
-        "cannot be judged as evaluation.system=" + type.name + ": " + out.missing.front(),
-        "name the system of these weights, or train what is missing");
   return out;
 }
 

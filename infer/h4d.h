@@ -55,7 +55,7 @@ class H4dSystem final : public System {
  public:
   /// `weights_name` and `where` name weights and target in errors. `rest`: the target's joints, if
   /// they are known; they take the place of the reconstructed ones. InputError: no network of this
-  /// role, or one without its body, a source of another rate than 30 frames a second.
+  /// role, or one without its body. Clouds have to come 30 a second, which make_system() checks.
   H4dSystem(const Bundle& weights, const std::string& weights_name, Mesh target,
             const std::string& where, const std::optional<Joints>& rest,
             const RetargetOptions& options);

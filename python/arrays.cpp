@@ -12,15 +12,19 @@ std::string shape_text(const py::array& a) {
   return out + "]";
 }
 
+void refuse_mask(const py::handle& value, const std::string& what) {
+  if (py::isinstance(value, py::module_::import("numpy.ma").attr("MaskedArray")))
+    throw InputError(what, "is a masked array, whose mask would be lost",
+                     "leave the masked rows out: numpy.ma.compress_rows(a)");
+}
+
 template <class T>
 py::array_t<T, py::array::c_style> numbers(const py::handle& value, const std::string& what) {
   const auto refuse = [&](const std::string& wrong) {
     throw InputError(what, wrong, "give an array of numbers");
   };
   if (!value || value.is_none() || py::isinstance<py::str>(value)) refuse("is no array");
-  if (py::hasattr(value, "mask"))
-    throw InputError(what, "is a masked array, whose mask would be lost",
-                     "leave the masked points out: a.compressed(), or a[keep]");
+  refuse_mask(value, what);
   const py::array any = py::array::ensure(value);
   if (!any) PyErr_Clear(), refuse("is no array");
   const char kind = any.dtype().kind();

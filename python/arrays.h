@@ -16,6 +16,8 @@ namespace restage::python {
 /// An array of real numbers, C-contiguous, of type T. InputError naming `what` for anything else.
 template <class T>
 py::array_t<T, py::array::c_style> numbers(const py::handle& value, const std::string& what);
+/// InputError naming `what` for a masked array.
+void refuse_mask(const py::handle& value, const std::string& what);
 /// "[2, 3]"
 std::string shape_text(const py::array& a);
 

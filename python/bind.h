@@ -76,14 +76,24 @@ class Watch {
     const py::gil_scoped_release released;
     const HostSignals asked([this] { return wanted(); });
     try {
-      return work();
+      if constexpr (std::is_void_v<decltype(work())>) {
+        work();
+        rethrow();
+      } else {
+        auto out = work();
+        rethrow();  // the work may have ended before it looked
+        return out;
+      }
     } catch (...) {
-      if (caught_) std::rethrow_exception(caught_);
+      rethrow();
       throw;
     }
   }
 
  private:
+  void rethrow() const {
+    if (caught_) std::rethrow_exception(caught_);
+  }
   /// Whether to stop. Asks Python some times a second, not more.
   bool wanted();
   std::chrono::steady_clock::time_point looked_{};

@@ -1,4 +1,6 @@
 // The program's commands, called from Python: the same options, checks and errors.
+#include <atomic>
+
 #include "autograd/base/error.h"
 #include "autograd/base/interrupt.h"
 #include "autograd/base/log.h"
@@ -10,7 +12,7 @@
 namespace restage::python {
 namespace {
 
-int chosen_threads = 0;
+std::atomic<int> chosen_threads{0};
 
 std::string bytes_of(const py::handle& text, const std::string& what) {
   const auto bytes = py::reinterpret_steal<py::bytes>(PyUnicode_EncodeFSDefault(text.ptr()));
@@ -41,7 +43,7 @@ bool of_numpy(const py::handle& value, const char* type) {
 
 void append_words(const std::string& name, const py::handle& value,
                   std::vector<std::string>& words) {
-  const bool on_without = name == "foot-lock" || name == "steady-bones";
+  const bool on_without = name == "foot-lock" || name == "steady-bones" || name == "keep-limbs";
   if (value.is_none()) return;
   if (PyBool_Check(value.ptr()) || of_numpy(value, "numpy.bool")) {
     const bool yes = PyObject_IsTrue(value.ptr()) == 1;

@@ -183,7 +183,7 @@ void add_system(py::module_& m) {
       .def("push_all", &PySystem::push, py::arg("points"), py::arg("name") = "cloud",
            "Takes the next cloud, [n, 3] in metres, y up (or as scale and source_up say), and "
            "returns the frames that it finishes, as a list. InputError leaves the system as it "
-           "was: call miss() then, or push another cloud.")
+           "was: call miss() for that cloud.")
       .def(
           "push",
           [](PySystem& self, const py::object& points, const std::string& name) {

@@ -95,6 +95,7 @@ py::tuple tuple_of(const Shape& shape) {
 Tensor tensor_of(const py::handle& value, bool share) {
   if (py::isinstance<Tensor>(value)) return value.cast<Tensor>();
   if (!value || value.is_none() || py::isinstance<py::str>(value)) refuse("there is no array");
+  refuse_mask(value, "tensor");
   py::array any = py::array::ensure(value);
   if (!any) PyErr_Clear(), refuse("there is no array");
   const DType type = held_as(any.dtype());
@@ -107,7 +108,7 @@ Tensor tensor_of(const py::handle& value, bool share) {
   if (!as_held) throw py::error_already_set();
   void* data = const_cast<void*>(as_held.data());
   // What may not be written to is no memory for a tensor, which assign() writes to.
-  if (share && (data != any.data() || any.ptr() != value.ptr() || !as_held.writeable()))
+  if (share && (data != any.data() || !py::isinstance<py::array>(value) || !as_held.writeable()))
     refuse(
         "copy=False: this array's memory cannot be shared; give a C-contiguous array of float32, "
         "float64, int32 or int64 that may be written to, or leave copy out");

@@ -3,14 +3,13 @@
 
 #include <atomic>
 
-#include "autograd/base/interrupt.h"
 #include "python/bind.h"
 
 namespace restage::python {
 namespace {
 
-/// Calls a function of Python, and stops the training (which writes a checkpoint first) on Ctrl-C
-/// or where the function raises.
+/// Calls a function of Python. The training stops (and writes a checkpoint first) on Ctrl-C or
+/// where the function raises.
 class StepWatch final : public TrainObserver {
  public:
   StepWatch(Watch& watch, py::object on_step) : watch_(watch), on_step_(std::move(on_step)) {}
@@ -24,8 +23,7 @@ class StepWatch final : public TrainObserver {
         for (const auto& [name, value] : values) figures[py::str(name)] = value;
         on_step_(stage.name(), done, figures);
       });
-    } catch (const Interrupted&) {
-      ask_to_stop();
+    } catch (const Interrupted&) {  // kept; the trainer asks the watch whether to stop
     }
   }
 

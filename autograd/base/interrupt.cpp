@@ -17,7 +17,8 @@ std::atomic<int> scopes{0};
 std::atomic<int> caught{0};
 std::atomic<bool> asked{false};
 std::atomic<int64_t> caught_at{0};  // milliseconds
-thread_local const std::function<bool()>* host = nullptr;
+std::atomic<int> wishes{0};         // of hosts
+thread_local HostSignals* host = nullptr;
 static_assert(std::atomic<int>::is_always_lock_free, "used in a signal handler");
 
 constexpr int64_t kSameRequest = 500;  // milliseconds
@@ -68,15 +69,21 @@ void ask_to_stop() {
 }
 
 HostSignals::HostSignals(std::function<bool()> ask) : ask_(std::move(ask)), outer_(host) {
-  host = &ask_;
+  host = this;
 }
-HostSignals::~HostSignals() { host = outer_; }
+HostSignals::~HostSignals() {
+  host = outer_;
+  if (wanted_) --wishes;
+}
+
+bool HostSignals::wants() {
+  if (!wanted_ && ask_()) wanted_ = true, ++wishes;
+  return wanted_;
+}
 
 bool stop_requested() {
   if (caught.load() != 0 || asked.load()) return true;
-  if (host == nullptr || !(*host)()) return false;
-  ask_to_stop();  // other threads have no host
-  return true;
+  return host != nullptr ? host->wants() : wishes.load() > 0;
 }
 
 void throw_if_stopped() {

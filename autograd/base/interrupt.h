@@ -36,7 +36,8 @@ class StopScope {
 void ask_to_stop();
 
 /// While it exists, stop_requested() in this thread also asks a host program that handles signals
-/// itself, such as Python. `ask` returns whether to stop, and must not throw.
+/// itself, such as Python. `ask` returns whether to stop, and must not throw. A wish of the host
+/// also reaches threads that have no host, and ends with this object.
 class HostSignals {
  public:
   explicit HostSignals(std::function<bool()> ask);
@@ -45,8 +46,12 @@ class HostSignals {
   HostSignals& operator=(const HostSignals&) = delete;
 
  private:
+  friend bool stop_requested();
+  bool wants();
+
   std::function<bool()> ask_;
-  const std::function<bool()>* outer_;
+  bool wanted_ = false;
+  HostSignals* outer_;
 };
 
 /// True after a signal in a StopScope, ask_to_stop(), or where a host says so.

@@ -19,8 +19,9 @@ namespace restage {
 namespace {
 std::mutex limit_mutex;  // of the next two
 std::unique_ptr<tbb::global_control> limit;
-// By their sizes. None is ever destroyed: another thread may be at work in it.
-std::map<int, std::unique_ptr<tbb::task_arena>> arenas;
+// By their sizes. None is ever destroyed, not even at exit: another thread may be at work in it.
+std::map<int, std::unique_ptr<tbb::task_arena>>& arenas =
+    *new std::map<int, std::unique_ptr<tbb::task_arena>>;
 std::atomic<tbb::task_arena*> arena{nullptr};
 std::atomic<int> requested{0};
 std::atomic<int64_t> cut{0};

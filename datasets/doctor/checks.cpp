@@ -132,6 +132,8 @@ void SourceWatch::judge() {
     }
     if (f.topic == "others" || f.topic == "plane") {
       wrong_ = f;
+      wrong_->what = std::string(f.topic == "plane" ? "a floor or a wall" : "a second person") +
+                     " is in the clouds before";
       fix_ = "let one person alone be in the clouds (restage doctor --fix mends recorded ones)";
       settled_ = false;
     }

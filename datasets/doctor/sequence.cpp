@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "autograd/base/interrupt.h"
 #include "datasets/doctor/examine_detail.h"
 #include "datasets/doctor/summary.h"
 #include "datasets/doctor/words.h"
@@ -144,6 +145,7 @@ class Sequence {
     d_.fewest_points = INT64_MAX;
     Mesh before;
     for (int64_t i = 0; auto frame = source_.next(); ++i) {
+      throw_if_stopped();
       if (frame->fault) throw *frame->fault;
       if (frame->points.empty())
         throw InputError(frame->source, "holds no points", "leave the frame out");

@@ -266,10 +266,10 @@ CloudSampler::Seen CloudSampler::see(const CloudSubject& subject, size_t n, cons
   if (subject.sensor != Sensor::none)
     out.points = sensed(subject.sensor, out.points, drawn.normals, n, scene.fold("cameras"),
                         key.fold("sensor"), &out.which);
-  if (subject.intruder) intrude(scene.fold("intruder"), key.fold("intruder"), &out);
   const float floor = lowest(out.points);
   if (subject.thing)
     put_thing(scene.fold("thing"), key.fold("thing"), subject.sensor != Sensor::none, &out);
+  if (subject.intruder) intrude(scene.fold("intruder"), key.fold("intruder"), &out);
   if (subject.cut_floor)
     cut_below(floor + static_cast<float>(Rng(scene.fold("floor")).uniform(0.01, 0.08)), out.points,
               out.which);

@@ -80,7 +80,7 @@ OnRing on_ring(const Legs& legs, double s, double radius, double share) {
   double at = std::fmod(share * all + all - 0.5 * std::numbers::pi * radius, all);
   for (const double side : {1.0, -1.0}) {
     const Vec3 &from = side > 0 ? a : b, &to = side > 0 ? b : a;
-    if (at < wide) return {from + side * at * across + side * radius * front, side * front};
+    if (at < wide) return {from + at / wide * (to - from) + side * radius * front, side * front};
     at -= wide;
     if (at < std::numbers::pi * radius || side < 0) {
       const double angle = at / radius;

@@ -21,7 +21,7 @@ struct Skirt {
 Skirt draw_skirt(Rng& rng);
 
 /// Points under the skirt of somebody with these joints make way for points of the skirt, one for
-/// one, as high up and in front of or behind the same leg; normals point outwards. The cloth is
+/// one, as far down the legs and about the same leg; normals point outwards. The cloth is
 /// taut between the legs. `legs`: which points are of legs or hips; no others move.
 void put_on(const Skirt& skirt, const Joints& joints, const std::vector<bool>& legs, Rng& rng,
             Points& points, Points& normals);

@@ -31,8 +31,6 @@ using File = PredictionFile;
 
 void check_pair(const File& pred, const File& truth) {
   check_same_frames(pred, truth);
-  for (const File* file : {&pred, &truth})  // frames are compared in their order
-    for (const std::string& remark : file->remarks) log_warning(file->path + ": " + remark);
   const bool joints = pred.joints().present() && truth.joints().present();
   const bool vertices = pred.vertices().present() && truth.vertices().present();
   if (vertices && pred.data.vertex_count != truth.data.vertex_count)
@@ -309,7 +307,8 @@ int run_eval(const EvalOptions& options, const Common& common) {
   report.model = metrics::evaluate(
       cut(offset, pred.joints(), pred.vertices(), pred.data.rotations, truth), report.metrics);
 
-  for (const std::string& remark : pred.remarks) log_warning(remark);
+  for (const File* file : {&pred, &truth})  // frames are compared in their order
+    for (const std::string& remark : file->remarks) log_warning(file->path + ": " + remark);
   const metrics::Value within = claim_held(pred, truth);
   const auto by_joint = options.per_joint ? errors_by_joint(pred, truth) : std::vector<double>();
   const Turns turns = metrics::rotation_error(pred.data.rotations, truth.data.rotations);

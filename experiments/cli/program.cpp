@@ -144,6 +144,7 @@ std::string in_plain_words(const CLI::App& command, const CLI::ParseError& error
     const CLI::Option* option = named_in(command, rest);
     const size_t value = rest.find(" = ");
     if (option == nullptr || value == std::string::npos) return message;
+    if (option->get_items_expected_max() == 0) return option->get_name() + " takes no value";
     const bool whole = option->get_type_name().find("INT") != std::string::npos;
     return "'" + rest.substr(value + 3) + "' is no " + (whole ? "whole " : "") + "number, and " +
            option->get_name() + " needs one";
@@ -151,7 +152,8 @@ std::string in_plain_words(const CLI::App& command, const CLI::ParseError& error
   const CLI::Option* option = named_in(command, message);
   if (option == nullptr) return message;
   if (dynamic_cast<const CLI::ArgumentMismatch*>(&error) != nullptr)
-    return option->get_name() + " needs a value";
+    return option->get_name() +
+           (message.find("At Most") != std::string::npos ? " is given twice" : " needs a value");
   if (dynamic_cast<const CLI::RequiredError*>(&error) == nullptr || !option->get_positional())
     return message;
   constexpr size_t kShort = 90;

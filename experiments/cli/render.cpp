@@ -164,6 +164,7 @@ class Rows {
     std::optional<Clip> truth;
     if (!options_.truth.empty()) {
       Clip whole = read({.path = options_.truth, .sequence = options_.sequence}, "truth");
+      if (!source && options_.fps) whole.fps = *options_.fps;
       check_same_motion(whole, result);
       truth = timed(std::move(whole));
       add_errors(*truth, &result);

@@ -3,6 +3,7 @@
 #include <memory>
 
 #include "autograd/base/format.h"
+#include "autograd/base/interrupt.h"
 #include "autograd/base/log.h"
 #include "autograd/base/output_check.h"
 #include "autograd/kernels/kernel.h"
@@ -92,6 +93,7 @@ int run_skeleton(const SkeletonOptions& given, const Common& common) {
   size_t left_out = 0;
   std::vector<double> sure;
   while (const auto frame = frames->next()) {
+    throw_if_stopped();
     if (frame->fault) throw *frame->fault;
     check_frame(frame->points, frame->source, FrameOptions::none);
     left_out += frame->left_out;

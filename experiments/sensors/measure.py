@@ -98,12 +98,13 @@ def skirt(rng, points, joints, length, flare):
     side = b - a - ((b - a) @ down)[:, None] * down
     wide = np.linalg.norm(side, axis=1)
     side /= np.maximum(wide, 1e-6)[:, None]
+    along = (b - a) / np.maximum(wide, 1e-6)[:, None]  # a straight ends at the other leg, however high that is
     front, radius = np.cross(down, side), 0.14 + flare * s
     turn = rng.random(count) * (2 * wide + 2 * np.pi * radius)  # along the seam: a straight, a half circle, a straight, a half circle
-    ring = a + side * np.clip(turn, 0, wide)[:, None] + front * radius[:, None]
+    ring = a + along * np.clip(turn, 0, wide)[:, None] + front * radius[:, None]
     angle = np.clip((turn - wide) / radius, 0, np.pi)
     around = np.where((turn < wide + np.pi * radius)[:, None], b + radius[:, None] * (np.sin(angle)[:, None] * side + np.cos(angle)[:, None] * front),
-                      a + side * np.clip(2 * wide + np.pi * radius - turn, 0, wide)[:, None] - front * radius[:, None])
+                      a + along * np.clip(2 * wide + np.pi * radius - turn, 0, wide)[:, None] - front * radius[:, None])
     angle = np.clip((turn - 2 * wide - np.pi * radius) / radius, 0, np.pi)
     last = a - radius[:, None] * (np.sin(angle)[:, None] * side + np.cos(angle)[:, None] * front)
     cloth = np.where((turn < wide)[:, None], ring, np.where((turn < 2 * wide + np.pi * radius)[:, None], around, last))

@@ -37,6 +37,21 @@ TEST(Interrupt, InAScopeOtherThreadsAreToldWhatAHostSays) {
   std::thread([] { EXPECT_TRUE(stop_requested()); }).join();
 }
 
+/// Two threads of a host, each at a command of its own, in scopes that overlap.
+TEST(Interrupt, AHostsWishIsForItsOwnCommandAndEndsWithIt) {
+  const StopScope another;  // of a command that goes on
+  {
+    const HostSignals host([] { return true; });
+    EXPECT_TRUE(stop_requested());
+    std::thread([] {
+      const HostSignals own([] { return false; });
+      EXPECT_FALSE(stop_requested()) << "that of another thread";
+    }).join();
+  }
+  const StopScope next;
+  EXPECT_FALSE(stop_requested());
+}
+
 TEST(Interrupt, ANewScopeForgetsTheLastOne) {
   {
     const StopScope scope;

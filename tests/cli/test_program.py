@@ -90,6 +90,8 @@ class Usage(CliTest):
         self.bad_input(["data", "inspekt"], "did you mean 'inspect'")
         self.bad_input(["eval", "--perd", "x"], "'--perd'", "did you mean '--pred'")
         self.bad_input(["eval", "--pred"], "--pred needs a value")
+        self.bad_input(["eval", "--pred", "a.h5", "--pred", "b.h5", "--truth", "c.h5"], "--pred is given twice")
+        self.bad_input(["doctor", "x", "--verbose=high"], "--verbose takes no value")
         self.bad_input(["eval", "--pred", "a.h5"], "--truth")
         self.bad_input(["eval", "--pred", "a.h5", "--truth", "b.h5", "more"], "'more'")
         self.bad_input(["doctor", "x", "--threads", "many"], "'many' is no whole number, and --threads needs one")

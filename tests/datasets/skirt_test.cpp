@@ -74,6 +74,27 @@ TEST(Skirt, GoesRoundBothLegsFromTheWaistToItsHem) {
   }
 }
 
+/// One knee is 0.3 m higher than the other: the cloth between them climbs, and is not torn.
+TEST(Skirt, IsWholeWhereOneLegIsHigher) {
+  Stand now;
+  now.joints[5] = {-0.1, 0.8, 0.3};
+  Rng rng(RngKey{1, 0});
+  const Points before = now.points;
+  put_on({.hem = 1.0, .ease = 0.02}, now.joints, now.legs, rng, now.points, now.normals);
+  Points cloth;
+  for (size_t i = 0; i < before.size(); ++i)
+    if (now.points[i] != before[i]) cloth.push_back(now.points[i]);
+  ASSERT_GT(cloth.size(), 500u);
+  const auto lowest_at = [&](float x) {
+    float out = 9;
+    for (const Point& p : cloth)
+      if (std::abs(p.x() - x) < 0.02f) out = std::min(out, p.y());
+    return out;
+  };
+  for (float x = -0.15f; x < 0.14f; x += 0.02f)
+    EXPECT_LT(std::abs(lowest_at(x) - lowest_at(x + 0.02f)), 0.12f) << "a step at " << x;
+}
+
 TEST(Skirt, LeavesAloneWhatIsNoLeg) {
   Stand now;
   now.legs.assign(now.points.size(), false);

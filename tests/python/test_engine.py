@@ -51,6 +51,15 @@ def test_memory_is_shared_and_kept_alive():
     assert np.array_equal(view, copy)
 
 
+def test_a_file_in_memory_is_shared(tmp_path):
+    a = np.memmap(tmp_path / "points.bin", np.float32, "w+", shape=(100, 3))
+    t = restage.Tensor(a, copy=False)
+    a[0, 0] = 42
+    assert t.numpy()[0, 0] == 42
+    with pytest.raises(restage.InputError, match="masked"):
+        restage.Tensor(np.ma.masked_array(np.ones(3), [0, 1, 0]))
+
+
 def test_read_only_memory_is_not_written_to():
     a = np.frombuffer(bytes(24), np.float32)
     t = restage.Tensor(a)
@@ -529,11 +538,13 @@ def test_train(tmp_path):
     class Enough(Exception):
         pass
 
-    def stop(stage, done, figures):
-        if done == 2:
-            raise Enough
+    for last in (2, 4):  # of four
 
-    with pytest.raises(Enough):
-        restage.train(config, on_step=stop)
+        def stop(stage, done, figures):
+            if done == last:
+                raise Enough
+
+        with pytest.raises(Enough):
+            restage.train(config, on_step=stop)
     with pytest.raises(restage.InputError):
         restage.train(tmp_path / "no.yaml")

@@ -183,6 +183,15 @@ def test_clouds_that_would_be_read_wrongly(walk):
             take(masked)
         with pytest.raises(restage.InputError, match="km from the origin"):
             take(cloud + [5.4e6, 0, 0])
+    assert system.push(np.ma.compress_rows(masked)) is not None, "the mend that the message names"
+
+    class Framed(np.ndarray):
+        """As a pandas.DataFrame, which can be masked and is not."""
+
+        def mask(self):
+            raise AssertionError
+
+    assert system.push(cloud.view(Framed)) is not None
     stray = cloud.copy()
     stray[0] = 3e5
     assert system.push(stray) is not None, "one point far away is no cloud far away"
@@ -192,8 +201,8 @@ def test_clouds_that_would_be_read_wrongly(walk):
         with pytest.raises(restage.InputError):
             restage.skeleton(nothing, LITE)
     restage.retarget([cloud], walk / "target.ply", LITE, foot_lock=np.bool_(False))
-    for options in ({"samples": 8}, {"anchor": 1.0}, {"foot_lock": False}, {"min_confidence": 0.5}):
-        name = "--" + ("no-" if options == {"foot_lock": False} else "") + next(iter(options)).replace("_", "-")
+    for options in ({"samples": 8}, {"anchor": 1.0}, {"foot_lock": False}, {"keep_limbs": False}, {"min_confidence": 0.5}):
+        name = "--" + ("no-" if False in options.values() else "") + next(iter(options)).replace("_", "-")
         with pytest.raises(restage.InputError, match=name + " says nothing to --system register"):
             restage.retarget([cloud], walk / "target.ply", LITE, system="register", rest=walk / "rest.h5", **options)
     with pytest.raises(restage.InputError, match="60 frames a second"):
