@@ -30,7 +30,7 @@ class PyExtractor {
 
   py::tuple operator()(const py::object& points, const std::string& name) {
     const Points cloud = points_of(points, name);
-    check_frame(cloud, name, FrameOptions::none);
+    check_frame(cloud, name, FrameMends::none);
     SeenJoints seen;
     {
       const py::gil_scoped_release released;

@@ -2,6 +2,7 @@
 #include "autograd/tensor/tensor.h"
 
 #include "autograd/kernels/kernel.h"
+#include "python/arrays.h"
 #include "python/engine.h"
 
 namespace restage::python {

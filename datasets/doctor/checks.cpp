@@ -53,7 +53,7 @@ std::string up_advice(int up, const std::string& given) {
 
 /// float32 holds coordinates to a centimetre up to here. A stray point may be anywhere, so all
 /// points have to be far away.
-void check_near(const Points& frame, const std::string& where, FrameOptions options) {
+void check_near(const Points& frame, const std::string& where, FrameMends options) {
   constexpr float kFar = 100'000;
   const auto is_far = [](const Point& p) { return p.cwiseAbs().maxCoeff() > kFar; };
   if (frame.empty() || !std::all_of(frame.begin(), frame.end(), is_far)) return;
@@ -61,7 +61,7 @@ void check_near(const Points& frame, const std::string& where, FrameOptions opti
                    "lies " + number(1e-3 * frame.front().cwiseAbs().maxCoeff()) +
                        " km from the origin, where single precision loses centimetres",
                    std::string("subtract the same origin from all frames") +
-                       (options == FrameOptions::scale_and_force
+                       (options == FrameMends::scale_and_force
                             ? ", give the unit with --scale, or --force to take it as it is"
                             : ""));
 }
@@ -73,7 +73,7 @@ void check_source(const std::vector<Mesh>& first_frames, const std::string& wher
   for (const Mesh& frame : first_frames)
     if (frame.vertices.size() < kEnoughPoints) return;  // refused when its turn comes
   if (first_frames.empty()) return;
-  check_near(first_frames.front().vertices, where, FrameOptions::scale_and_force);
+  check_near(first_frames.front().vertices, where, FrameMends::scale_and_force);
   Given frames(first_frames);
   const Diagnosis d = examine_frames(frames);
   const bool some_odd = !std::all_of(first_frames.begin(), first_frames.end(),
@@ -147,13 +147,13 @@ bool may_be_a_person(const Points& frame) {
          is_person_sized(size / kRoom);
 }
 
-void check_frame(const Points& frame, const std::string& where, FrameOptions options) {
+void check_frame(const Points& frame, const std::string& where, FrameMends options) {
   check_near(frame, where, options);
   if (may_be_a_person(frame)) return;
   throw InputError(where,
                    "is of another size than people: half of its points lie within " +
                        number(normalised(frame).size) + " m of the middle",
-                   options == FrameOptions::scale_and_force
+                   options == FrameMends::scale_and_force
                        ? "give all frames in metres (--scale), leave this one out, or --force to "
                          "take it as it is"
                        : "give metres (restage doctor --fix OUT makes metres of files)");

@@ -130,8 +130,8 @@ class SourceWatch {
 bool may_be_a_person(const Points& frame);
 /// InputError where it is not, or is so far away that float32 loses centimetres. `options`: which
 /// of them the message can name.
-enum class FrameOptions { scale_and_force, none };
+enum class FrameMends { scale_and_force, none };
 void check_frame(const Points& frame, const std::string& where,
-                 FrameOptions options = FrameOptions::scale_and_force);
+                 FrameMends options = FrameMends::scale_and_force);
 
 }  // namespace restage

@@ -95,7 +95,7 @@ int run_skeleton(const SkeletonOptions& given, const Common& common) {
   while (const auto frame = frames->next()) {
     throw_if_stopped();
     if (frame->fault) throw *frame->fault;
-    check_frame(frame->points, frame->source, FrameOptions::none);
+    check_frame(frame->points, frame->source, FrameMends::none);
     left_out += frame->left_out;
     SeenJoints seen = extract(frame->points, frame->source, key);
     if (seen.uncertainty) sure.push_back(confidence(*seen.uncertainty));
