@@ -297,6 +297,10 @@ std::string weights_path(const std::string& given) {
   namespace fs = std::filesystem;
   std::error_code ignored;
   const std::string file_or_folder = here_or_shipped(given);
+  if (!fs::exists(file_or_folder, ignored))
+    if (const std::string ours = shipped("experiments/weights/" + given + ".safetensors");
+        !ours.empty())
+      return ours;
   if (!fs::is_directory(file_or_folder, ignored)) return file_or_folder;
   const std::string path = (fs::path(file_or_folder) / "weights.safetensors").string();
   if (!fs::exists(path, ignored))

@@ -92,6 +92,18 @@ class Joints(Skeleton):
                          self.json("skeleton", "--weights", self.w, "--input", "a.ply")["frames"])
 
 
+    def test_weights_that_come_with_the_program_have_names(self):
+        self.ply("a.ply", self.cloud)
+        call = ("skeleton", "--input", "a.ply")
+        self.assertEqual(self.json(*call, "--weights", "lite"), self.json(*call, "--weights", "experiments/weights/lite.safetensors"))
+        standard, captures = (self.json(*call, *weights)["frames"][0] for weights in ((), ("--weights", "captures")))
+        self.assertIn("radius", captures)
+        self.assertNotEqual(standard["joints"], captures["joints"])
+        self.bad_input([*call, "--weights", "capture"], "capture")
+        os.symlink(self.w, self.path("captures"))
+        self.assertNotIn("radius", self.json(*call, "--weights", "captures")["frames"][0], "one's own file comes first")
+
+
 class BadClouds(Skeleton):
     def bad(self, name, *contains, w=None, more=()):
         self.bad_input(["skeleton", "--weights", w or self.w, "--input", name, *more], *contains)
