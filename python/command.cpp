@@ -33,7 +33,9 @@ bool of_the_shell(const std::string& name) {
 std::string value_of(const std::string& name, const py::handle& value) {
   if (PyObject_HasAttrString(value.ptr(), "__fspath__") || PyBytes_Check(value.ptr()))
     return path_of(value);
-  return bytes_of(py::str(value), "'" + name + "'");
+  std::string out = bytes_of(py::str(value), "'" + name + "'");
+  if (out.empty()) throw InputError("", "'" + name + "' is an empty text", "leave it out, or None");
+  return out;
 }
 
 /// Whether the name of a value's type begins so ("numpy.bool_", and "numpy.bool" from NumPy 2 on).
@@ -99,8 +101,10 @@ std::string path_of(const py::handle& path) {
         "'" + std::string(py::str(py::type::of(path).attr("__name__"))) + "' is no name of a file",
         "give a str or a path");
   }
-  if (!PyBytes_Check(bytes.ptr())) return bytes_of(bytes, "a file's name");
-  std::string out = py::reinterpret_borrow<py::bytes>(bytes);
+  const bool plain = PyBytes_Check(bytes.ptr());
+  std::string out = plain ? std::string(py::reinterpret_borrow<py::bytes>(bytes))
+                          : bytes_of(bytes, "a file's name");
+  if (out.empty()) throw InputError("", "a file's name is an empty text", "leave it out, or None");
   if (out.find('\0') != std::string::npos)
     throw InputError("", "a file's name holds what no name can hold", "give a plain name");
   return out;

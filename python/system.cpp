@@ -60,7 +60,17 @@ class PySystem {
         check_frame(cloud, name);
         watch_->look(cloud, name);
       }
-      const std::span<const RetargetedFrame> made = system_->push(cloud, name);
+      const std::span<const RetargetedFrame> made = [&] {
+        try {
+          return system_->push(cloud, name);
+        } catch (const UnusableCloud&) {
+          // Somebody may have come.
+          if (clear_) watch_.emplace(SourceFrame{c_.source.scale, c_.source.up});
+          clear_ = false;
+          throw;
+        }
+      }();
+      clear_ = true;
       frame_seconds_ =
           std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
       return copy(made);
@@ -145,6 +155,7 @@ class PySystem {
   cli::RetargetCommand c_;
   std::optional<ToOurs> to_ours_;
   std::optional<SourceWatch> watch_;
+  bool clear_ = false;  // the system took the last cloud that it was given
   std::unique_ptr<System> system_;
 };
 

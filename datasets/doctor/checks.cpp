@@ -130,10 +130,13 @@ void SourceWatch::judge() {
       fix_ = up_advice(d.orientation.up, given_.up);
       return;
     }
-    if (f.topic == "others" || f.topic == "plane") {
+    const bool nobody = f.topic == "up" && f.sure < kNobody;
+    if (nobody || f.topic == "others" || f.topic == "plane") {
       wrong_ = f;
-      wrong_->what = std::string(f.topic == "plane" ? "a floor or a wall" : "a second person") +
-                     " is in the clouds before";
+      wrong_->what = std::string(nobody               ? "nobody can be made out"
+                                 : f.topic == "plane" ? "a floor or a wall is"
+                                                      : "a second person is") +
+                     " in the clouds before";
       fix_ = "let one person alone be in the clouds (restage doctor --fix mends recorded ones)";
       settled_ = false;
     }

@@ -128,7 +128,7 @@ class Stream {
          live::Mailbox& box, live::Words& words)
       : c_(c),
         to_ours_(c.how.source.scale, c.how.source.up),
-        watch_({c.how.source.scale, c.how.source.up}),
+        watch_(new_watch()),
         system_(system),
         vmc_(vmc),
         page_(page),
@@ -203,13 +203,19 @@ class Stream {
       }
       const auto made = system_.push(cloud_.points, cloud_.name);
       missed_ = told_ = 0;
-      going_ = true;
+      going_ = clear_ = true;
       if (!made.empty()) send(made.back());
+    } catch (const UnusableCloud& fault) {
+      if (clear_) watch_ = new_watch();  // somebody may have come
+      clear_ = false;
+      leave_out(fault);
     } catch (const InputError& fault) {
       if (watch_.hopeless()) throw;  // so the program ends
       leave_out(fault);
     }
   }
+
+  SourceWatch new_watch() const { return SourceWatch({c_.how.source.scale, c_.how.source.up}); }
 
   /// More points than a network looks at cost time and say nothing new.
   void thin() {
@@ -254,6 +260,7 @@ class Stream {
   const StreamCommand& c_;
   const ToOurs to_ours_;
   SourceWatch watch_;
+  bool clear_ = false;  ///< the system took the last cloud that it was given
   System& system_;
   live::VmcSender& vmc_;
   live::PageServer* page_;

@@ -293,19 +293,24 @@ Bundle bundle_of(const TensorFile& file, const std::string& where) {
   return out;
 }
 
+/// A name ("captures") is that of weights that come with the program, where neither a file nor a
+/// run is called so.
 std::string weights_path(const std::string& given) {
   namespace fs = std::filesystem;
   std::error_code ignored;
-  const std::string file_or_folder = here_or_shipped(given);
-  if (!fs::exists(file_or_folder, ignored))
-    if (const std::string ours = shipped("experiments/weights/" + given + ".safetensors");
-        !ours.empty())
-      return ours;
-  if (!fs::is_directory(file_or_folder, ignored)) return file_or_folder;
-  const std::string path = (fs::path(file_or_folder) / "weights.safetensors").string();
-  if (!fs::exists(path, ignored))
-    throw InputError(file_or_folder, "holds no weights.safetensors",
+  const std::string place = here_or_shipped(given);
+  const bool folder = fs::is_directory(place, ignored);
+  const std::string path = folder ? (fs::path(place) / "weights.safetensors").string() : place;
+  if (fs::exists(path, ignored)) return path;
+  if (const std::string ours = shipped("experiments/weights/" + given + ".safetensors");
+      !ours.empty())
+    return ours;
+  if (folder)
+    throw InputError(place, "holds no weights.safetensors",
                      "give a weights file, a finished run or an artifact");
+  if (given.find_first_of("./") == std::string::npos)
+    throw InputError(given, "is no file here, and no weights of this name come with the program",
+                     "give a weights file, a finished run, or standard, captures or lite");
   return path;
 }
 

@@ -108,8 +108,7 @@ void save_bundle(const std::string& path, const Bundle& bundle);
 /// impossible or unknown, tensors belong to no model, or (StateError) tensors do not fit.
 Bundle bundle_of(const TensorFile& file, const std::string& where);
 /// The models of a weights file, or of a folder that holds weights.safetensors (a run, an
-/// artifact); the name of weights that come with the program ("captures"), where there is no such
-/// file.
+/// artifact).
 Bundle load_bundle(const std::string& path);
 /// The weights file that load_bundle() reads. InputError if the folder holds none.
 std::string weights_path(const std::string& file_or_folder);

@@ -99,7 +99,10 @@ class Joints(Skeleton):
         standard, captures = (self.json(*call, *weights)["frames"][0] for weights in ((), ("--weights", "captures")))
         self.assertIn("radius", captures)
         self.assertNotEqual(standard["joints"], captures["joints"])
-        self.bad_input([*call, "--weights", "capture"], "capture")
+        self.bad_input([*call, "--weights", "capture"], "capture", "standard, captures or lite")
+        os.mkdir(self.path("captures"))  # of clouds, say
+        self.assertEqual(captures, self.json(*call, "--weights", "captures")["frames"][0])
+        os.rmdir(self.path("captures"))
         os.symlink(self.w, self.path("captures"))
         self.assertNotIn("radius", self.json(*call, "--weights", "captures")["frames"][0], "one's own file comes first")
 

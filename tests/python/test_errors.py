@@ -93,6 +93,33 @@ def test_a_second_person_who_leaves(walk):
     assert system.push(alone[7]) and system.push(both[0])
 
 
+def test_an_empty_text_is_no_name(walk, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    source, target = walk / "source.h5", walk / "target.ply"
+    for call in (lambda: restage.retarget(source, target, LITE, out=""), lambda: restage.doctor(source, fix=""), lambda: restage.Extractor(""),
+                 lambda: restage.retarget("", target, LITE), lambda: restage.System(target, b""), lambda: restage.System(target, LITE, rest="")):
+        with pytest.raises(restage.InputError, match="empty text"):
+            call()
+    assert not list(tmp_path.iterdir())
+
+
+def test_somebody_comes_later(walk):
+    """A cloud that is unclear makes the system look again who is in the picture."""
+    alone = [np.asarray(c) for c in restage.load_clouds(walk / "source.h5")]
+    system = restage.System(walk / "target.ply", samples=1)
+    for k in range(16):
+        system.push(alone[k % len(alone)])
+    refusals = []
+    for k in range(16, 60):
+        both = np.concatenate([alone[k % len(alone)], alone[k % len(alone)] + np.float32([1.2, 0, 0])])
+        try:
+            system.push(both)
+        except restage.InputError as error:
+            refusals.append(str(error))
+            system.miss()
+    assert len(refusals) > 30 and all("a second person is in the clouds" in text for text in refusals[8:]), refusals
+
+
 def test_bad_sources(walk):
     for bad in (3, [], [np.zeros((5, 2))], np.zeros((3, 3)), [None], object()):
         with pytest.raises(restage.InputError):
