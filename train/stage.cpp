@@ -91,9 +91,6 @@ void Stage::load(const TensorFile& file, const std::string& where) {
 
 void Stage::start_from(const Bundle& weights, const std::vector<std::string>& names,
                        const std::string& where) {
-  if (names.empty())
-    throw InputError(where, "would give nothing: init_names is empty",
-                     "name tensors, or * for all, or leave init out");
   started_from_weights_ = true;
   std::vector<bool> used(names.size(), false);
   for (const Network& n : networks_) {

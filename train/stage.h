@@ -95,8 +95,7 @@ class Stage {
   /// Takes tensors of trained weights in the place of random ones: the tensors whose names in a
   /// weights file ("smrm.enc.weight_ih_l0") match one of `names`, where * stands for any text. The
   /// settings stay those of the stage; if the weights have others, the log warns. InputError naming
-  /// `where`: no patterns, a pattern that matches nothing, a tensor that is missing or does not
-  /// fit.
+  /// `where`: a pattern that matches nothing, a tensor that is missing or does not fit.
   void start_from(const Bundle& weights, const std::vector<std::string>& names,
                   const std::string& where);
   bool started_from_weights() const { return started_from_weights_; }

@@ -36,6 +36,9 @@ std::unique_ptr<Stage> make_stage(const TrainConfig& config, const std::string& 
                                           data.answers, device_of(config.device)});
   stage->repeat_batches(config.loop.overfit_batches);
   stage->cut_steps(config.loop.micro_batches, data.team != nullptr ? *data.team : alone());
+  if (section.init && section.init_names.empty())
+    throw InputError(*section.init, "would give nothing: " + name + ".init_names is empty",
+                     "name tensors, or * for all, or leave init out");
   if (section.init)
     stage->start_from(load_bundle(*section.init), section.init_names, *section.init);
   return stage;
