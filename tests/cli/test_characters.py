@@ -224,9 +224,10 @@ class Characters(CliTest):
         self.assertLess(max(abs(a - b) for a, b in zip(first, again)), 1e-5)
         for option in (["--samples", "8"], ["--min-confidence", "0.5"], ["--system", "refine"], ["--sequence", "0"], ["--profile"]):
             self.bad_input([*call, "--out", "x.glb", *option], "walk.bvh", option[0], "--from-surface")
-        done = self.restage(*call, "--out", "x.glb", "--weights", "w")
+        done = self.restage(*call, "--out", "x.glb", "--weights", "lite")
         self.assertEqual(done.code, 0)
         self.assertIn("--weights is not used", done.err)
+        self.bad_input([*call, "--out", "x.glb", "--weights", "w"], "w:", "standard, captures or lite")
         self.bad_input([*call, "--out", "x.glb", "--format", "ply"], "x.glb", "leave --format out")
         self.bad_input([*call, "--out", "x.glb", "--clip", "walk"], "leave --clip out")
         self.bad_input([*call, "--out", "x.glb", "--body-model", "hero.glb"], "walk.bvh", "leave --body-model out")
