@@ -160,6 +160,7 @@ struct SourceRecord {
   std::optional<double> fps = std::nullopt;        ///< frames per second; nothing: the file's
   double scale = 1;                                ///< metres per unit
   std::string up = "y";                            ///< the axis that points up: x, -x, y, -y, z, -z
+  bool up_known = false;                           ///< somebody said which axis it is; not stored
 };
 
 /// Nothing where the prediction does not say. A relative path is stored relative to the

@@ -6,6 +6,7 @@
 #include "autograd/base/interrupt.h"
 #include "datasets/doctor/examine.h"
 #include "infer/own_body.h"
+#include "infer/retargeter.h"
 #include "nn/geometry/steady_bones.h"
 #include "nn/metrics/label_free.h"
 #include "nn/metrics/surfaces.h"
@@ -126,6 +127,7 @@ Assessment assess(Source& source, const Bundle& weights, const std::string& weig
   Seen all;
   SomeFrames some;
   std::optional<SeenJoints> before;
+  int64_t gap = 0;  // frames left out since then
   SteadyBones bones;
   for (int64_t i = 0; auto cloud = source.next(); ++i) {
     throw_if_stopped();
@@ -133,12 +135,18 @@ Assessment assess(Source& source, const Bundle& weights, const std::string& weig
     try {
       if (cloud->fault) throw *cloud->fault;
       check_frame(points, cloud->frame.source);
-      const bool remembers = before && source.fps() > kRemembering;
-      before = extract(points, cloud->frame.source, key.fold(static_cast<uint64_t>(i)),
-                       remembers ? &*before : nullptr);
+      const double apart = static_cast<double>(gap + 1) / source.fps();  // seconds
+      const bool remembers = before && 1 / apart > kRemembering;
+      SeenJoints seen = extract(points, cloud->frame.source, key.fold(static_cast<uint64_t>(i)),
+                                remembers ? &*before : nullptr);
+      if (before && apart <= RetargetOptions().lost_seconds && is_lost(seen, *before))
+        throw InputError(cloud->frame.source, "shows nobody who can be made out",
+                         "leave the frame out");
+      before = std::move(seen);
+      gap = 0;
     } catch (const InputError& fault) {
       if (out.left_out++ == 0) out.why = fault.what();
-      before.reset();
+      ++gap;
       continue;
     }
     all.number.push_back(i);

@@ -135,6 +135,7 @@ void mend_frames(const Subject& subject, const Diagnosis& d, Mender& mend, Sink&
   if (subject.mesh) return sink.push(mend(*subject.mesh), 0);
   subject.frames->rewind();
   int64_t empty = 0, leading = 0;  // frames without points: written, left out in front
+  int64_t closed = 0;              // gaps
   int64_t odd = 0, odd_now = 0;    // frames that are of another size than people: all, in a row
   std::optional<Mesh> previous;
   int64_t sequence = 0, row = -1, row_before = -1;  // of the source, where empty frames count too
@@ -147,7 +148,7 @@ void mend_frames(const Subject& subject, const Diagnosis& d, Mender& mend, Sink&
       previous.reset();
       mend.restart();
     }
-    if (i % d.keep_every != 0) continue;
+    if (i % d.keep_every != 0 || i < d.odd_front) continue;
     Mesh mesh = mend({frame->points, frame->faces});
     const bool odd_one =
         previous && may_be_a_person(previous->vertices) && !may_be_a_person(mesh.vertices);
@@ -156,22 +157,27 @@ void mend_frames(const Subject& subject, const Diagnosis& d, Mender& mend, Sink&
     if (stood_in) mesh = *previous;
     odd += stood_in;
     const int64_t from = stood_in ? row_before : row;
-    // A gap of up to a second: the nearest frame in time stands in. In a longer one frames that
-    // show nothing stay, so that those behind it keep their time; in front they are left out.
+    // Frames without points keep the time of those behind them; in front they are left out.
     const auto gap = d.gap.find(i);
     const int64_t missing = gap == d.gap.end() ? 0 : gap->second;
-    const int64_t filled = d.is_filled(missing) ? missing / d.keep_every : 0;
-    for (int64_t k = 0; k < filled; ++k)
-      previous && 2 * k < filled ? sink.push(*previous, row_before) : sink.push(mesh, from);
-    const int64_t kept = d.is_filled(missing) ? 0 : frame->missing / d.keep_every;
-    for (int64_t k = 0; previous && k < kept; ++k) sink.push({}, row - frame->missing + k);
+    const int64_t kept = d.is_kept(missing) ? missing / d.keep_every : 0;
+    for (int64_t k = 0; previous && k < kept; ++k)
+      sink.push({}, std::max(row_before, row - missing + k));
     (previous ? empty : leading) += kept;
+    closed += missing > 0 && kept == 0;
     sink.push(mesh, from);
     previous = std::move(mesh);
     row_before = from;
   }
   if (empty > 0)
-    remarks.push_back(cat("in gaps of over a second ", empty, " frames without points stay"));
+    remarks.push_back(cat("in gaps ", empty, empty == 1 ? " frame" : " frames",
+                          " without points; retarget fills up to a third of a second of them"));
+  if (closed > 0)
+    remarks.push_back(cat(closed, closed == 1 ? " gap" : " gaps", " of over a minute closed"));
+  if (d.odd_front > 0)
+    remarks.push_back(cat("left out: the first ", d.odd_front,
+                          d.odd_front == 1 ? " frame" : " frames",
+                          ", of another size than the rest"));
   if (odd > 0)
     remarks.push_back(cat("in ", odd, odd == 1 ? " frame that is" : " frames that are",
                           " of another size than people the frame before stands in"));

@@ -2,8 +2,8 @@
 
 #include <algorithm>
 
-#include "datasets/doctor/examine.h"
 #include "datasets/importers/axis.h"
+#include "datasets/readers/errors.h"
 #include "datasets/readers/gltf.h"
 #include "nn/geometry/strays.h"
 #include "nn/models/extraction.h"
@@ -69,6 +69,7 @@ std::optional<SourceCloud> Source::next() {
     return_to_place();
     return out;
   }
+  if (out.frame.number >= 0) numbers_.push_back(out.frame.number);
   out.fault = out.frame.fault;
   if (!out.fault && out.frame.points.empty())
     out.fault = InputError(out.frame.source, "holds no points", "leave the frame out");
@@ -89,8 +90,24 @@ void Source::skip(int64_t frames) {
 
 void Source::rewind() {
   at_ = 0;
+  numbers_.clear();
   broken_.reset();
   frames_->rewind();
+}
+
+std::vector<std::string> Source::remarks() const {
+  std::vector<std::string> out = frames_->remarks();
+  if (std::ssize(numbers_) != frames_->frames() || numbers_.size() < 2) return out;
+  int64_t step = INT64_MAX, missing = 0;
+  for (size_t i = 1; i < numbers_.size(); ++i) step = std::min(step, numbers_[i] - numbers_[i - 1]);
+  if (step < 1) return out;
+  for (size_t i = 1; i < numbers_.size(); ++i)
+    missing += (numbers_[i] - numbers_[i - 1]) / step - 1;
+  if (missing > 0)
+    out.push_back(cat(missing, missing == 1 ? " number is" : " numbers are",
+                      " missing in the names of the frames, which are played without a pause; "
+                      "'restage doctor --fix OUT' puts frames without points there"));
+  return out;
 }
 
 /// Behind a frame that could not be read, whatever the reader did about it.
@@ -103,6 +120,8 @@ void Source::return_to_place() {
   }
 }
 
+SourceFrame frame_of(const SourceRecord& how) { return {how.scale, how.up, how.up_known}; }
+
 void check_first_frames(Source& source) {
   std::vector<Mesh> first;
   for (int i = 0; i < kSourceFrames; ++i) {
@@ -113,8 +132,7 @@ void check_first_frames(Source& source) {
     first.push_back({std::move(cloud->frame.points), std::move(cloud->frame.faces)});
   }
   source.rewind();
-  const SourceRecord& how = source.record();
-  check_source(first, how.path, {how.scale, how.up});
+  check_source(first, source.record().path, frame_of(source.record()));
 }
 
 }  // namespace restage

@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "autograd/base/error.h"
+#include "datasets/doctor/examine.h"
 #include "datasets/readers/frame_folder.h"
 #include "datasets/schema.h"
 
@@ -47,7 +48,7 @@ class Source {
   int64_t sequences() const { return frames_->sequences(); }
   double fps() const { return *how_.fps; }
   /// What the user should know of the whole, such as files that were left out.
-  std::vector<std::string> remarks() const { return frames_->remarks(); }
+  std::vector<std::string> remarks() const;
   /// How it is read; the rate is there, also where it is the file's.
   const SourceRecord& record() const { return how_; }
 
@@ -58,8 +59,12 @@ class Source {
   ToOurs to_ours_;
   std::unique_ptr<FrameSource> frames_;
   int64_t at_ = 0;                    // frames given or skipped
+  std::vector<int64_t> numbers_;      // of the frames that were given, if all have one
   std::optional<InputError> broken_;  // nothing behind this place can be read
 };
+
+/// How the source is read, for the doctor.
+SourceFrame frame_of(const SourceRecord& how);
 
 /// The doctor's words on what would make nonsense of all that is done with the source: looks at
 /// its first frames, and rewinds. InputError, as check_source() says.

@@ -29,6 +29,17 @@ std::string on_one_line(std::string text) {
   return valid_utf8(text);
 }
 
+std::string cause_of(const InputError& fault) {
+  const std::string text = fault.what();
+  return text.substr(0, text.rfind("; "));
+}
+
+std::string mend_of(const InputError& fault) {
+  const std::string text = fault.what();
+  const size_t end = text.rfind("; ");
+  return end == std::string::npos ? "" : text.substr(end + 2) + "; ";
+}
+
 std::string shell_word(const std::string& text) {
   std::string out = "'";
   for (const char c : text) out += c == '\'' ? std::string("'\\''") : std::string(1, c);

@@ -5,6 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "autograd/base/error.h"
+
 namespace restage {
 
 /// Names of files may hold any bytes: here what is not UTF-8 becomes U+FFFD.
@@ -15,6 +17,9 @@ std::string on_one_line(std::string text);
 std::string shell_word(const std::string& text);
 /// `restage: <text>` as exactly one line of under 400 characters.
 std::string error_line(const std::string& text);
+/// What is wrong, without how to mend it; and how to mend it, with "; " behind it, or nothing.
+std::string cause_of(const InputError& fault);
+std::string mend_of(const InputError& fault);
 /// "1 frame", "3 frames".
 std::string counted(int64_t n, const std::string& what);
 /// A Markdown table with columns of equal width; the first row is the heading, the first column is

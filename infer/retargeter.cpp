@@ -15,6 +15,7 @@ namespace {
 constexpr int kTargetSamples = 16;  // views of the target, more than of a frame: it is seen once
 constexpr size_t kTargetPoints = 8192;
 constexpr double kTposeLimit = 30.0;  // degrees
+constexpr double kClear = 0.5;        // confidence of a frame in which all can be made out
 constexpr double kRemembering = 8;  // frames per second; at lower rates a frame tells too little of
                                     // the next one, and the extractor is not told
 
@@ -190,21 +191,24 @@ std::span<const RetargetedFrame> Retargeter::push(const Points& cloud, const std
   return out;
 }
 
+bool is_lost(const SeenJoints& now, const SeenJoints& before) {
+  constexpr double kLost = 0.25;  // docs/notes/real_scans_log.md
+  return now.uncertainty && before.uncertainty && confidence(*now.uncertainty) < kLost &&
+         confidence(*before.uncertainty) >= kClear;
+}
+
 /// A frame in which nobody can be made out, soon after one in which everything was clear, is a
 /// fault of the source (another unit, another axis up, another thing). B would be thrown about for
 /// it, and the memory of it would spoil the frames after it (RetargetOptions::lost_seconds).
 void Retargeter::check_not_lost(const SeenJoints& seen, const std::string& source) const {
-  constexpr double kClear = 0.5, kLost = 0.25;  // docs/notes/real_scans_log.md
-  if (!received_ || !received_->uncertainty || !seen.uncertainty) return;
+  if (!received_ || !is_lost(seen, *received_)) return;
   if (static_cast<double>(missed_ + 1) / options_.fps > options_.lost_seconds + 1e-9) return;
-  const double sure = confidence(*seen.uncertainty);
-  if (sure < kLost && confidence(*received_->uncertainty) >= kClear)
-    throw UnusableCloud(source,
-                        format("shows nobody who can be made out (confidence %.2f), unlike the "
-                               "frames before",
-                               sure),
-                        "give all frames in one unit and with one axis up, leave this one out, or "
-                        "--force to take it as it is");
+  throw UnusableCloud(source,
+                      format("shows nobody who can be made out (confidence %.2f), unlike the "
+                             "frames before",
+                             confidence(*seen.uncertainty)),
+                      "give all frames in one unit and with one axis up, leave this one out, or "
+                      "--force to take it as it is");
 }
 
 void Retargeter::miss() {
@@ -305,17 +309,31 @@ void Retargeter::hold_doubtful(const Joints& a, RetargetedFrame* out) {
   out->pose = waiting_.wait(rest);
 }
 
+/// B begins where A does, in proportion to its legs. If A could not be made out then, B begins once
+/// more in the first clear frame: half of somebody, or another thing, is no place to start from.
+void Retargeter::begin(const SeenJoints& seen) {
+  const bool clear = !seen.uncertainty || confidence(*seen.uncertainty) >= kClear;
+  if (previous_ && (clear_start_ || !clear)) return;
+  const Joints& a = seen.joints;
+  const double scale = leg_length(rest_) / std::max(leg_length(a), 1e-6);
+  start_a_ = a[0];
+  root_b_ = start_b_ = scale * a[0];
+  centre_a_ = scaling_centre(a[0]);
+  centre_b_ = scale * centre_a_;
+  if (previous_) {  // once more
+    previous_.reset();
+    back_before_.reset();
+    feet_ = {};
+    legs_a_ = leg_length(a);
+  }
+  clear_start_ = clear;
+}
+
 /// The motion network's answer to A as `seen`. `turn`: A's heading.
 MotionOutput Retargeter::answer(const SeenJoints& seen, const Mat3& turn) {
   const Joints& a = seen.joints;
   const Mat3 back = turn.transpose();
-  if (!previous_) {  // B begins where A does, in proportion to its legs
-    const double scale = leg_length(rest_) / std::max(leg_length(a), 1e-6);
-    start_a_ = a[0];
-    root_b_ = start_b_ = scale * a[0];
-    centre_a_ = scaling_centre(a[0]);
-    centre_b_ = scale * centre_a_;
-  }
+  begin(seen);
   const Vec3 before = path_ == Path::velocity   ? (previous_ ? (*previous_)[0] : a[0])
                       : path_ == Path::relative ? start_a_
                                                 : Vec3(Vec3::Zero());

@@ -47,6 +47,10 @@ struct RetargetOptions {
   bool steady_bones = true;
 };
 
+/// Whether a frame shows nobody who can be made out, unlike a frame `before` in which all was
+/// clear.
+bool is_lost(const SeenJoints& now, const SeenJoints& before);
+
 /// Our chain of three networks: the extractor finds A's joints in a cloud, the motion network finds
 /// B's pose for them, the deformation network gives B's surface. Every network computes on the
 /// device on which its parameters lie (move_networks()); the deformation network on the motion
@@ -95,6 +99,7 @@ class Retargeter final : public System {
   size_t advance(const SeenJoints& seen, bool ended);
   /// Answers one moment of the grid. False: the network has not answered yet, `out` is not set.
   bool step(const SeenJoints& seen, bool filled, RetargetedFrame* out);
+  void begin(const SeenJoints& seen);
   MotionOutput answer(const SeenJoints& seen, const Mat3& turn);
   void perform(const MotionOutput& answer, const Joints& a, const Mat3& turn, Pose* pose);
   void hold_doubtful(const Joints& a, RetargetedFrame* out);
@@ -122,7 +127,8 @@ class Retargeter final : public System {
   std::optional<Mat3> back_before_;     ///< the turn that took A's heading away one frame ago
   std::optional<SeenJoints> received_;  ///< A in the frame that was pushed last
   Joints last_source_;
-  Vec3 start_a_ = Vec3::Zero(), start_b_ = Vec3::Zero();  ///< pelvises in the first frame
+  Vec3 start_a_ = Vec3::Zero(), start_b_ = Vec3::Zero();  ///< pelvises in the first (clear) frame
+  bool clear_start_ = true;                               ///< whether that frame was clear
   Vec3 root_b_ = Vec3::Zero();                            ///< B's pelvis, before feet are held
   Vec3 centre_a_ = Vec3::Zero(),
        centre_b_ = Vec3::Zero();  ///< centres about which paths are scaled

@@ -10,6 +10,7 @@
 #include <functional>
 #include <string>
 #include <type_traits>
+#include <utility>
 #include <vector>
 
 #include "autograd/base/interrupt.h"
@@ -50,15 +51,21 @@ void add_train(py::module_& m);
 
 // ---- calls into the program (command.cpp) -------------------------------------------------------
 
-/// `--name=value` of every keyword of Python: True is a flag, None and False say nothing.
-/// InputError for what no command line could say.
-std::vector<std::string> words_of(const py::dict& options);
+/// A command line of Python. What True and False mean for an option, only its command can tell.
+struct Words {
+  std::vector<std::string> words;
+  std::vector<std::pair<std::string, bool>> switches;  ///< "foot-lock", without dashes
+};
+/// `--name=value` of every keyword of Python; None says nothing. InputError for what no command
+/// line could say.
+Words words_of(const py::dict& options);
 /// A file's name, as bytes; InputError if it cannot be one.
 std::string path_of(const py::handle& path);
 
-/// A command as a caller of its own: `add` adds it to a Program and says what it does; `words` are
-/// read by it. Returns what it prints. Is called without the GIL.
-std::string run_command(const std::string& name, std::vector<std::string> words,
+/// A command as a caller of its own: `add` adds it to a Program and says what it does; `given` is
+/// read by it. Returns what it prints. Is called without the GIL. InputError for True and False
+/// where an option needs a value.
+std::string run_command(const std::string& name, Words given,
                         const std::function<void(cli::Program&)>& add);
 
 /// Looks whether Python wants something (Ctrl-C) while C++ works without the GIL, and carries an

@@ -1,4 +1,5 @@
 // The program's commands, called from Python: the same options, checks and errors.
+#include <algorithm>
 #include <atomic>
 
 #include "autograd/base/error.h"
@@ -43,19 +44,59 @@ bool of_numpy(const py::handle& value, const char* type) {
   return std::string_view(Py_TYPE(value.ptr())->tp_name).starts_with(type);
 }
 
-void append_words(const std::string& name, const py::handle& value,
-                  std::vector<std::string>& words) {
-  const bool on_without = name == "foot-lock" || name == "steady-bones" || name == "keep-limbs";
+void append_option(const std::string& name, const py::handle& value, Words& out) {
   if (value.is_none()) return;
   if (PyBool_Check(value.ptr()) || of_numpy(value, "numpy.bool")) {
-    const bool yes = PyObject_IsTrue(value.ptr()) == 1;
-    if (on_without && !yes) words.push_back("--no-" + name);
-    if (!on_without && yes) words.push_back("--" + name);
+    out.switches.emplace_back(name, PyObject_IsTrue(value.ptr()) == 1);
   } else if (PyList_Check(value.ptr()) || PyTuple_Check(value.ptr())) {
-    for (const py::handle item : value) words.push_back("--" + name + "=" + value_of(name, item));
+    for (const py::handle item : value)
+      out.words.push_back("--" + name + "=" + value_of(name, item));
   } else {
-    words.push_back("--" + name + "=" + value_of(name, value));
+    out.words.push_back("--" + name + "=" + value_of(name, value));
   }
+}
+
+/// The options of the command that the words begin with: "restage data build ...".
+std::vector<cli::CommandTree::Option> options_of(const cli::Program& program,
+                                                 const std::vector<std::string>& words) {
+  cli::CommandTree at = program.tree();
+  for (size_t k = 1; k < words.size() && !at.commands.empty(); ++k) {
+    const auto named = [&](const cli::CommandTree& c) { return c.name == words[k]; };
+    const auto found = std::find_if(at.commands.begin(), at.commands.end(), named);
+    if (found == at.commands.end()) break;
+    const cli::CommandTree below = *found;
+    at = below;
+  }
+  return at.options;
+}
+
+/// True and False as the command's flags say them. Unknown names go on, so that the program says
+/// which one was meant.
+std::vector<std::string> flags_of(const Words& given,
+                                  const std::vector<cli::CommandTree::Option>& known) {
+  const auto& [words, switches] = given;
+  const auto named = [&](const std::string& name) {
+    return std::find_if(known.begin(), known.end(), [&](const auto& o) { return o.name == name; });
+  };
+  for (const std::string& word : words) {
+    const std::string name = word.substr(0, word.find('='));
+    if (name.size() < 3 || name.size() == word.size()) continue;
+    if (named(name) == known.end() && named("--no-" + name.substr(2)) != known.end())
+      throw InputError("", "'" + name.substr(2) + "' is " + word.substr(name.size() + 1),
+                       "give True or False");
+  }
+  std::vector<std::string> out;
+  for (const auto& [name, on] : switches) {
+    const std::string yes = "--" + name, no = "--no-" + name;
+    const auto flag = named(yes);
+    if (flag != known.end() && flag->value)
+      throw InputError("", "'" + name + "' is " + (on ? "True" : "False") + ", and needs a value",
+                       "give the value" + std::string(on ? "" : ", or None"));
+    const bool negative = named(no) != known.end();
+    if (!on && negative) out.push_back(no);
+    if (flag == known.end() ? !negative : on) out.push_back(yes);
+  }
+  return out;
 }
 
 /// Whether exit code 1 is an answer, which the document explains, and not a failure.
@@ -80,14 +121,23 @@ void use_threads(int n) {
   set_threads(n);
 }
 
-std::string run_words(const py::args& arguments) {
+void refuse(const std::string& option, const std::string& mend) {
+  throw InputError("", "unknown option '" + option + "' of Python's restage", mend);
+}
+
+std::string run_words(const py::args& arguments, const py::kwargs& options) {
+  Words given = words_of(options);
   std::vector<std::string> words;
   for (const py::handle word : arguments) words.push_back(value_of("argument", word));
   if (words.empty()) throw InputError("", "no command was given", "see 'restage --help'");
+  for (const std::string& word : words)
+    if (word == "-h" || word == "--help") refuse(word, "call it in a shell");
   const std::string name = words.front();
   words.erase(words.begin());
+  words.emplace_back("--json");
+  given.words.insert(given.words.begin(), words.begin(), words.end());
   Watch watch;
-  return watch.run([&] { return run_command(name, words, cli::add_commands); });
+  return watch.run([&] { return run_command(name, given, cli::add_commands); });
 }
 
 }  // namespace
@@ -110,33 +160,34 @@ std::string path_of(const py::handle& path) {
   return out;
 }
 
-std::vector<std::string> words_of(const py::dict& options) {
-  std::vector<std::string> words;
+Words words_of(const py::dict& options) {
+  Words out;
   bool verbose = false;
   for (const auto& [key, value] : options) {
     std::string name = bytes_of(key, "an option");
     for (char& c : name)
       if (c == '_') c = '-';
     if (of_the_shell(name) || name.find('=') != std::string::npos)
-      throw InputError("", "unknown option '--" + name + "' of Python's restage",
-                       name == "threads" ? "call restage.set_threads()" : "leave it out");
+      refuse("--" + name, name == "threads" ? "call restage.set_threads()" : "leave it out");
     verbose = verbose || (name == "verbose" && PyObject_IsTrue(value.ptr()) == 1);
-    append_words(name, value, words);
+    append_option(name, value, out);
   }
-  if (!verbose) words.emplace_back("--quiet");
-  return words;
+  if (!verbose) out.words.emplace_back("--quiet");
+  return out;
 }
 
-std::string run_command(const std::string& name, std::vector<std::string> words,
+std::string run_command(const std::string& name, Words given,
                         const std::function<void(cli::Program&)>& add) {
+  std::vector<std::string>& words = given.words;
   words.insert(words.begin(), {"restage", name});
   // Program::run() sets them.
-  if (name != "--help" && name != "--version")
-    words.push_back("--threads=" + std::to_string(chosen_threads));
+  if (name != "--version") words.push_back("--threads=" + std::to_string(chosen_threads));
   const StopScope stop;  // forgets what stopped an earlier command
   cli::Captured captured;
   cli::Program program;
   add(program);
+  for (std::string& flag : flags_of(given, options_of(program, words)))
+    words.push_back(std::move(flag));
   read_options(program, words);
   return captured.text;
 }
@@ -165,8 +216,8 @@ bool Watch::wanted() {
 
 void add_command(py::module_& m) {
   set_log_level(LogLevel::quiet);
-  m.def("run", &run_words, "Runs `restage WORDS` in this process and returns what it would print.");
-  m.def("words_of", &words_of);
+  m.def("run", &run_words,
+        "Runs `restage WORDS --options --json` in this process and returns what it would print.");
   m.def("set_threads", &use_threads, py::arg("n"),
         "How many threads compute from now on; 0: as many as there are cores. Results have the "
         "same bits for any number.");

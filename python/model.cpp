@@ -75,6 +75,10 @@ py::list names() {
 TensorMap tensors_of(const py::dict& arrays) {
   TensorMap out;
   for (const auto& [key, value] : arrays) {
+    if (!py::isinstance<py::str>(key))
+      throw InputError("",
+                       "a tensor's name is " + std::string(py::repr(key)) + ", which is no text",
+                       "name tensors by str");
     const bool parameter = py::isinstance<Parameter>(value);
     out[py::str(key)] = parameter ? value.cast<PyParameter>()->value.cpu() : tensor_of(value).cpu();
   }

@@ -25,6 +25,7 @@ void add_norms(py::module_& m) {
   m.def(
       "batch_norm",
       [](const O& x, const O& scale, const O& shift, double eps) {
+        check_not_negative("batch_norm", "eps", eps);
         return op_of(
             [eps](const Var& xv, const Var& a, const Var& b) { return batch_norm(xv, a, b, eps); },
             x, scale, shift);
@@ -34,6 +35,7 @@ void add_norms(py::module_& m) {
   m.def(
       "layer_norm",
       [](const O& x, const O& scale, const O& shift, double eps) {
+        check_not_negative("layer_norm", "eps", eps);
         return op_of(
             [eps](const Var& xv, const Var& a, const Var& b) { return layer_norm(xv, a, b, eps); },
             x, scale, shift);
@@ -43,6 +45,7 @@ void add_norms(py::module_& m) {
   m.def(
       "instance_norm",
       [](const O& x, double eps) {
+        check_not_negative("instance_norm", "eps", eps);
         return op_of([eps](const Var& v) { return instance_norm(v, eps); }, x);
       },
       py::arg("x"), py::arg("eps") = 1e-5,

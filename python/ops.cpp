@@ -32,7 +32,7 @@ void binary_op(py::module_& m, const char* name, const char* doc, F f) {
 RngKey key_of(uint64_t seed, uint64_t stream) { return RngKey{seed, stream}.fold("python"); }
 
 void check_rate(double p) {
-  if (!(p < 1)) throw ShapeError("dropout: p must be in [0, 1)");
+  if (!(p >= 0 && p < 1)) throw ShapeError("dropout: p must be in [0, 1)");
 }
 
 void add_elementwise(py::module_& m) {
@@ -228,6 +228,7 @@ void add_reduce(py::module_& m) {
   m.def(
       "smooth_length",
       [](const O& x, double epsilon) {
+        check_not_negative("smooth_length", "epsilon", epsilon);
         return op_of([&](const Var& v) { return smooth_length(v, epsilon); }, x);
       },
       py::arg("x"), py::arg("epsilon"),
@@ -235,6 +236,8 @@ void add_reduce(py::module_& m) {
   m.def(
       "bce_with_logits",
       [](const O& x, double label) {
+        if (!(label >= 0 && label <= 1))
+          throw ShapeError("bce_with_logits: the label must be in [0, 1]");
         return op_of([&](const Var& v) { return bce_with_logits(v, label); }, x);
       },
       py::arg("logits"), py::arg("label"),
@@ -242,6 +245,12 @@ void add_reduce(py::module_& m) {
 }
 
 }  // namespace
+
+void check_not_negative(const char* op, const char* name, double value) {
+  if (!(value >= 0))
+    throw ShapeError(std::string(op) + ": " + name + " is " + std::to_string(value) +
+                     ", and must not be negative");
+}
 
 Activation activation_of(const std::string& name) {
   const auto names = activations();

@@ -103,10 +103,10 @@ std::string text_of(const cli::Json& document) {
 
 py::object run(const py::object& source, const py::object& target, const py::object& weights,
                const py::object& out, const py::dict& options) {
-  std::vector<std::string> words = words_of(options);
-  words.push_back("--target=" + path_of(target));
-  if (!weights.is_none()) words.push_back("--weights=" + path_of(weights));
-  if (!out.is_none()) words.push_back("--out=" + path_of(out));
+  Words given = words_of(options);
+  given.words.push_back("--target=" + path_of(target));
+  if (!weights.is_none()) given.words.push_back("--weights=" + path_of(weights));
+  if (!out.is_none()) given.words.push_back("--out=" + path_of(out));
   Watch watch;
   Arrays arrays;
   cli::RetargetCaller caller;
@@ -115,13 +115,13 @@ py::object run(const py::object& source, const py::object& target, const py::obj
     caller.sink = [&arrays](const cli::Shown& shown) { return sink_into(arrays, shown); };
   cli::RetargetCommand c;
   if (names_a_file(source))
-    words.push_back("--source=" + path_of(source));
+    given.words.push_back("--source=" + path_of(source));
   else
     caller.clouds = std::make_unique<ArrayFrames>(clouds_of(source));
   if (caller.clouds) c.source.path = "clouds";
   std::string document;
   watch.run([&] {
-    run_command("retarget", words, [&](cli::Program& program) {
+    run_command("retarget", given, [&](cli::Program& program) {
       const auto action = [&] {
         document = text_of(cli::retarget(c, program.common(), std::move(caller)).document);
         return 0;

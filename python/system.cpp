@@ -2,6 +2,7 @@
 #include "infer/system.h"
 
 #include <chrono>
+#include <cstring>
 #include <mutex>
 
 #include "datasets/doctor/examine.h"
@@ -21,6 +22,7 @@ struct Frame {
   std::optional<double> confidence;
   bool filled = false;
 
+  Frame() = default;
   explicit Frame(const RetargetedFrame& f)
       : vertices(f.vertices), confidence(f.confidence), filled(f.filled) {
     if (!f.joints) return;
@@ -39,14 +41,14 @@ class PySystem {
  public:
   using Bound = void;
   PySystem(const py::object& target, const py::object& weights, const py::dict& options) {
-    std::vector<std::string> words = words_of(options);
-    words.push_back("--target=" + path_of(target));
-    if (!weights.is_none()) words.push_back("--weights=" + path_of(weights));
+    Words given = words_of(options);
+    given.words.push_back("--target=" + path_of(target));
+    if (!weights.is_none()) given.words.push_back("--weights=" + path_of(weights));
     Watch watch;
     watch.run([&] {
-      run_command("system", words, [&](cli::Program& program) {
+      run_command("retarget", given, [&](cli::Program& program) {
         const auto make_it = [&] { return make(program.common()), 0; };
-        add_options(program.add("system", "", "", make_it));
+        add_options(program.add("retarget", "", "", make_it));
       });
     });
   }
@@ -65,7 +67,7 @@ class PySystem {
           return system_->push(cloud, name);
         } catch (const UnusableCloud&) {
           // Somebody may have come.
-          if (clear_) watch_.emplace(SourceFrame{c_.source.scale, c_.source.up});
+          if (clear_) watch_.emplace(frame_of(c_.source));
           clear_ = false;
           throw;
         }
@@ -117,7 +119,7 @@ class PySystem {
     cli::add_system_options(app, c_);
     app.add_flag("--late", c_.options.late, "use the weights' network that looks ahead");
     app.add_option("--fps", c_.source.fps, "frames per second of the clouds");
-    app.add_option("--source-up", c_.source.up, "the clouds' axis that points up");
+    cli::add_source_up(app, c_.source);
     cli::add_scale(app, c_.source.scale, "the clouds' units in metres");
     app.add_flag("--force", c_.options.force, "accept what the doctor calls wrong");
   }
@@ -125,7 +127,7 @@ class PySystem {
   void make(const cli::Common& common) {
     cli::check_options(c_.options, system_type(c_.system));
     to_ours_.emplace(c_.source.scale, c_.source.up);
-    watch_.emplace(SourceFrame{c_.source.scale, c_.source.up});
+    watch_.emplace(frame_of(c_.source));
     if (c_.source.fps && !(*c_.source.fps >= 1 && *c_.source.fps <= 1000))
       throw InputError("", "--fps is out of range",
                        "give the clouds' frames per second, 1 to 1000");
@@ -159,6 +161,36 @@ class PySystem {
   std::unique_ptr<System> system_;
 };
 
+/// What pickle and copy carry: bytes of the arrays, confidence, filled.
+py::tuple state_of(const Frame& f) {
+  const auto bytes = [](const auto& values) {
+    return py::bytes(reinterpret_cast<const char*>(values.data()),
+                     values.size() * sizeof(values[0]));
+  };
+  return py::make_tuple(bytes(f.vertices), bytes(f.joints), bytes(f.rotations), f.confidence,
+                        f.filled);
+}
+
+std::shared_ptr<Frame> frame_of(const py::tuple& state) {
+  constexpr size_t kParts = 5;
+  if (state.size() != kParts) throw py::value_error("this is no frame of restage");
+  const auto fill = [&](size_t part, auto& values) {
+    const auto bytes = state[part].cast<std::string_view>();
+    values.resize(bytes.size() / sizeof(values[0]));
+    if (!values.empty())
+      std::memcpy(static_cast<void*>(values.data()), bytes.data(),
+                  values.size() * sizeof(values[0]));
+  };
+  auto out = std::make_shared<Frame>();
+  fill(0, out->vertices), fill(1, out->joints), fill(2, out->rotations);
+  const auto whole = [](const auto& v, size_t n) { return v.empty() || v.size() == n; };
+  if (!whole(out->joints, 3 * kJoints) || !whole(out->rotations, 4 * kJoints))
+    throw py::value_error("this is no frame of restage");
+  out->confidence = state[3].cast<std::optional<double>>();
+  out->filled = state[4].cast<bool>();
+  return out;
+}
+
 void add_frame(py::module_& m) {
   const auto joints = [](const py::object& self, std::vector<float> Frame::*of, int width) {
     const auto& values = self.cast<Frame&>().*of;
@@ -182,7 +214,8 @@ void add_frame(py::module_& m) {
           "float32 [22, 4], unit quaternions w x y z: world turns from the T-pose")
       .def_readonly("confidence", &Frame::confidence,
                     "how sure the extractor is of the source's joints, 0 to 1, or None")
-      .def_readonly("filled", &Frame::filled, "whether no cloud is behind this frame");
+      .def_readonly("filled", &Frame::filled, "whether no cloud is behind this frame")
+      .def(py::pickle(&state_of, &frame_of));
 }
 
 }  // namespace

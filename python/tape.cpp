@@ -14,6 +14,8 @@ PyVar leaf_of(const std::shared_ptr<PyTape>& tape, const py::object& of) {
     const auto p = of.cast<PyParameter>();
     id = p->id, value = p->value;
   } else {
+    if (py::isinstance<PyVar>(of) && of.cast<const PyVar&>().var.on_tape())
+      throw ShapeError("tape: a leaf of a value that is on a tape; give its detach()");
     id = Parameter::next_id(), value = tensor_of(of);
   }
   if (value.dtype() != DType::f32 && value.dtype() != DType::f64)
@@ -46,14 +48,20 @@ PyVar with_number(With how, const PyVar& a, double c, bool reversed) {
       case With::div:
         break;
     }
-    if (!reversed) return scale(x, 1 / c);
-    return div(Tensor::full({1}, c, x.dtype()), x);
+    const Var number = Tensor::full({1}, c, x.dtype());  // times 1 / c has other bits
+    return reversed ? div(number, x) : div(x, number);
   });
 }
 
+/// A number of Python or NumPy, which takes the type of what is beside it.
+bool is_number(const py::object& value) {
+  if (PyFloat_Check(value.ptr()) || PyLong_Check(value.ptr())) return true;
+  return PyObject_HasAttrString(value.ptr(), "dtype") &&
+         py::isinstance(value, py::module_::import("numpy").attr("number"));
+}
+
 PyVar with(With how, const PyVar& a, const py::object& other, bool reversed) {
-  if (PyFloat_Check(other.ptr()) || PyLong_Check(other.ptr()))
-    return with_number(how, a, other.cast<double>(), reversed);
+  if (is_number(other)) return with_number(how, a, other.cast<double>(), reversed);
   const DType type = a.var.dtype();
   const PyVar b = var_of(other, &type);
   const Var &x = reversed ? b.var : a.var, &y = reversed ? a.var : b.var;

@@ -77,13 +77,19 @@ DType dtype_of(const std::string& name) {
 
 Shape shape_of(const py::handle& value) {
   Shape out;
-  if (py::isinstance<py::int_>(value)) return Shape{value.cast<int64_t>()};
+  const auto size_of = [](const py::handle& size) {
+    if (!PyIndex_Check(size.ptr()) || PyBool_Check(size.ptr()))
+      refuse("a shape is a tuple of integers");
+    const py::ssize_t n = PyNumber_AsSsize_t(size.ptr(), PyExc_OverflowError);
+    if (n == -1 && PyErr_Occurred()) PyErr_Clear(), refuse("a shape is a tuple of integers");
+    return static_cast<int64_t>(n);
+  };
+  if (PyIndex_Check(value.ptr()) && !py::isinstance<py::sequence>(value))
+    return Shape{size_of(value)};
   if (!py::isinstance<py::sequence>(value) || py::isinstance<py::str>(value))
     refuse("a shape is a tuple of integers");
-  for (const py::handle size : py::reinterpret_borrow<py::sequence>(value)) {
-    if (!py::isinstance<py::int_>(size)) refuse("a shape is a tuple of integers");
-    out.push_back(size.cast<int64_t>());
-  }
+  for (const py::handle size : py::reinterpret_borrow<py::sequence>(value))
+    out.push_back(size_of(size));
   return out;
 }
 

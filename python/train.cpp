@@ -50,18 +50,18 @@ class OneAtATime {
 
 std::string run(const py::args& arguments, const py::dict& options, const py::object& on_step) {
   const OneAtATime alone;
-  std::vector<std::string> words = words_of(options);
+  Words given = words_of(options);
   for (const py::handle word : arguments) {
     const bool path = PyObject_HasAttrString(word.ptr(), "__fspath__");
-    words.push_back(path ? path_of(word) : std::string(py::str(word)));
+    given.words.push_back(path ? path_of(word) : std::string(py::str(word)));
   }
-  words.emplace_back("--json");
+  given.words.emplace_back("--json");
   Watch watch;
   StepWatch steps(watch, on_step);
   cli::TrainArguments a;
   a.observers.push_back(&steps);
   return watch.run([&] {
-    return run_command("train", words, [&](cli::Program& program) {
+    return run_command("train", given, [&](cli::Program& program) {
       const auto action = [&] { return cli::run_train(a, program.common()); };
       cli::add_train_options(program.add("train", "", "", action), a);
     });

@@ -1,5 +1,7 @@
 #include "autograd/ops/layout.h"
 
+#include <cstdlib>
+
 #include "autograd/ops/elementwise.h"
 #include "autograd/ops/linear.h"
 
@@ -186,6 +188,9 @@ void Unfold::check(Inputs x) const {
   require_floats(name, letters, x);
   if (k < 1 || stride < 1 || steps < 0)
     shape_error(name, letters, x, "kernel and stride must be positive");
+  constexpr int64_t kMost = 1 << 20;
+  if (k > kMost || stride > kMost || std::abs(pad_left) > kMost || steps > kMost * kMost)
+    shape_error(name, letters, x, "kernel, stride and pad_left are at most 2^20");
 }
 
 Tensor Unfold::forward(Inputs x, Saved&) const {

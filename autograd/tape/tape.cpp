@@ -86,7 +86,7 @@ const Tensor* Gradients::find(uint64_t id) const {
 
 const Tensor* Gradients::find(const Var& inner) const {
   const auto it = inner_.find(inner.node);
-  return !inner.on_tape() || it == inner_.end() ? nullptr : &it->second;
+  return inner.link != link_ || it == inner_.end() ? nullptr : &it->second;
 }
 
 /// Computes the sums of squares that are not known yet: all are launched before the first is waited
@@ -95,7 +95,9 @@ void Gradients::measure(std::span<const uint64_t> ids) const {
   std::vector<const Leaf*> open;
   for (const uint64_t id : ids) {
     const auto it = by_id_.find(id);
-    if (it != by_id_.end() && !it->second.squares) open.push_back(&it->second);
+    if (it == by_id_.end()) continue;
+    const Leaf& leaf = it->second;
+    if (!leaf.squares || leaf.version != leaf.gradient.version()) open.push_back(&leaf);
   }
   if (open.empty()) return;
   const Tensor sums =
@@ -105,7 +107,10 @@ void Gradients::measure(std::span<const uint64_t> ids) const {
     launch(SquaredNormArgs{open[i]->gradient, one});
   }
   const Tensor known = sums.cpu();
-  for (size_t i = 0; i < open.size(); ++i) open[i]->squares = known.item(static_cast<int64_t>(i));
+  for (size_t i = 0; i < open.size(); ++i) {
+    open[i]->squares = known.item(static_cast<int64_t>(i));
+    open[i]->version = open[i]->gradient.version();
+  }
 }
 
 double Gradients::norm(std::span<const uint64_t> ids) const {
@@ -225,13 +230,19 @@ Gradients Tape::backward(const Var& loss, const Tensor& gradient) {
   const std::unordered_set<int64_t> kept(kept_.begin(), kept_.end());
   kept_.clear();
   Gradients result;
+  result.set_tape(link_);
+  std::unordered_set<const void*> given{gradient.address()};
+  // Whoever writes to a gradient changes that one alone.
+  const auto own = [&given](const Tensor& g) {
+    return given.insert(g.address()).second ? g : g.clone();
+  };
   for (size_t i = at(loss.node) + 1; i-- > 0;) {
     Node& node = nodes[i];
     if (!grads[i].defined()) continue;  // the loss does not depend on it
     const int64_t number = first + static_cast<int64_t>(i);
-    if (kept.contains(number)) result.set_inner(number, grads[i]);
+    if (kept.contains(number)) result.set_inner(number, grads[i].clone());
     if (node.function == nullptr) {
-      result.set(node.id, grads[i]);
+      result.set(node.id, own(grads[i]));
       continue;
     }
     const Grads gx = node.backward(grads[i]);

@@ -97,10 +97,11 @@ class Gradients {
   const Tensor* find(uint64_t id) const;
   /// Gradient of a value that Tape::keep_gradient() named, or null.
   const Tensor* find(const Var& inner) const;
+  void set_tape(TapeLink link) { link_ = std::move(link); }
   void set_inner(int64_t node, Tensor gradient) { inner_[node] = std::move(gradient); }
-  void set(uint64_t id, Tensor gradient) { by_id_[id] = {std::move(gradient), {}}; }
+  void set(uint64_t id, Tensor gradient) { by_id_[id] = {std::move(gradient), {}, 0}; }
   /// Euclidean norm over these leaves, in double, summed in the order given; a leaf without a
-  /// gradient adds nothing. The part of each leaf is computed once.
+  /// gradient adds nothing. The part of each leaf is computed once, unless it is written to.
   double norm(std::span<const uint64_t> ids) const;
   /// Euclidean norm over all leaves, in the order of their identities.
   double norm() const;
@@ -110,10 +111,12 @@ class Gradients {
   struct Leaf {
     Tensor gradient;
     mutable std::optional<double> squares;  // the sum of its squares
+    mutable uint64_t version = 0;           // of the gradient that these are of
   };
   void measure(std::span<const uint64_t> ids) const;
   std::unordered_map<uint64_t, Leaf> by_id_;
-  std::unordered_map<int64_t, Tensor> inner_;  // by node; in no norm
+  std::unordered_map<int64_t, Tensor> inner_;  // by node of link_; in no norm
+  TapeLink link_;
 };
 
 class Tape {

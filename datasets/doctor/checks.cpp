@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "autograd/base/log.h"
 #include "datasets/doctor/examine_detail.h"
 #include "datasets/doctor/orientation_model.h"
 #include "datasets/doctor/words.h"
@@ -48,7 +49,14 @@ std::string scale_advice(double size, double given) {
 std::string up_advice(int up, const std::string& given) {
   const Mat3 back = upright(parse_axis(given, "--source-up")).transpose();
   const Axis own = axis_near(back * direction(up));
-  return own == Axis::y ? "leave --source-up out" : "give --source-up " + to_string(own);
+  return "give --source-up " + to_string(own) + " (--source-up " + given +
+         " where people lie or hang)";
+}
+
+/// What the clouds look like, where somebody said otherwise.
+std::string contradiction(const Finding& f, const SourceFrame& given) {
+  return f.what + " by what the first clouds show (sure " + per_cent(f.sure) +
+         "), but --source-up " + given.up + " was given, and is taken";
 }
 
 /// float32 holds coordinates to a centimetre up to here. A stray point may be anywhere, so all
@@ -87,6 +95,10 @@ void check_source(const std::vector<Mesh>& first_frames, const std::string& wher
     if (f.topic == "up" && f.sure < kNobody) refuse(where, f, "give scans of one whole person");
     // A few frames, alike: less certain than the many that the doctor looks at.
     if (f.topic == "up" && f.sure < kVerySure) continue;
+    if (f.topic == "up" && given.up_known) {
+      log_warning(where + ": " + contradiction(f, given));
+      continue;
+    }
     if (f.topic == "up") refuse(where, f, up_advice(d.orientation.up, given.up));
     refuse(where, f, "restage doctor --fix OUT mends it");
   }
@@ -126,6 +138,10 @@ void SourceWatch::judge() {
   for (const Finding& f : d.findings) {
     if (f.weight != Weight::wrong) continue;
     if (f.topic == "up" && f.sure >= kVerySure) {
+      if (given_.up_known) {
+        log_warning(contradiction(f, given_));
+        continue;
+      }
       wrong_ = f;
       fix_ = up_advice(d.orientation.up, given_.up);
       return;

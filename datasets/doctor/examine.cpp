@@ -75,7 +75,8 @@ Diagnosis doctor_detail::judge_surface(const Mesh& mesh, const PersonShape& shap
   judge_up(d, seen, options, 1);
   judge_facing(d, options);
   const Vec3 up = direction(d.orientation.up);
-  judge_frame(d, quantile(shape.points, up, kLevel), quantile(shape.points, up, 1 - kLevel));
+  judge_frame(d, quantile(shape.points, up, kLevel), quantile(shape.points, up, 1 - kLevel),
+              shape.parts.planes);
   judge_pose(d, shape, options);
   judge_parts(d, shape, "");
   return d;

@@ -46,8 +46,10 @@ struct Diagnosis {
   std::set<int64_t> repeated;  ///< frames equal to the one before (from 0)
   std::map<int64_t, int64_t> gap;  ///< before frame (from 0): so many frames are missing
 
-  /// Whether so many missing frames are replaced by those around them: up to a second of them.
-  bool is_filled(int64_t missing) const { return static_cast<double>(missing) <= fps; }
+  int odd_front = 0;  ///< so many first frames are of another size than the rest
+
+  /// Whether frames without points are put where so many are missing: up to a minute of them.
+  bool is_kept(int64_t missing) const { return static_cast<double>(missing) <= 60 * fps; }
   void say(const Finding& finding) { findings.push_back(finding); }
   bool usable() const;  ///< no finding that makes the result nonsense
   const Finding* find(const std::string& topic) const;
@@ -92,6 +94,7 @@ std::optional<bool> is_mirrored(const Joints& joints, const Vec3& up = Vec3::Uni
 struct SourceFrame {
   double scale = 1;
   std::string up = "y";
+  bool up_known = false;  ///< somebody said so: what the clouds look like is then a warning
 };
 
 /// Cheap checks before retargeting: what the doctor finds wrong is refused in the doctor's words, a

@@ -29,8 +29,9 @@ void recognise(Diagnosis& d, const Seen& seen, const ExamineOptions& options);
 void judge_units(Diagnosis& d, bool target);
 void judge_up(Diagnosis& d, const Seen& seen, const ExamineOptions& options, size_t clouds);
 void judge_facing(Diagnosis& d, const ExamineOptions& options);
-/// Transform, height and floor; heights along the up axis found, in the data's units.
-void judge_frame(Diagnosis& d, double lowest, double highest);
+/// Transform, height and floor; heights along the up axis found, in the data's units. `planes`: in
+/// view.
+void judge_frame(Diagnosis& d, double lowest, double highest, const std::vector<FlatPlane>& planes);
 void judge_points(Diagnosis& d, size_t distinct);
 /// Of one cloud: whether it is the path of one point.
 void judge_path(Diagnosis& d, const Points& points);

@@ -16,6 +16,8 @@ namespace {
 constexpr double kFloorMatters = 0.05;  // metres; less is noise, or a shoe's sole
 constexpr double kPoseSure = 0.75;      // of the up axis: seated people are seldom more certain
 constexpr double kPlaneMatters = 0.03;  // share of all points
+constexpr double kNearlyLevel = 0.8;    // cosine: a floor, as a sensor that looks down sees it
+constexpr double kTiltMatters = 2;      // degrees
 
 }  // namespace
 
@@ -80,7 +82,7 @@ void judge_units(Diagnosis& d, bool target) {
 }
 
 void judge_up(Diagnosis& d, const Seen& seen, const ExamineOptions& options, size_t clouds) {
-  const Orientation& o = d.orientation;
+  const Orientation o = d.orientation;
   Finding f{"up", Weight::fact, cat(kDirections[o.up], " is up"), o.up_sure, "", ""};
   f.evidence = "where a person's points lie, in 144 attitudes" +
                (clouds > 1 ? ", over " + counted(clouds, "frame") : std::string());
@@ -106,8 +108,16 @@ void judge_up(Diagnosis& d, const Seen& seen, const ExamineOptions& options, siz
     // What is of no person's size may be no person: then only a note.
     f.weight = o.up_sure >= kSure && d.unit.sure >= kUnsure ? Weight::wrong : Weight::note;
     f.what += ", not +y";
-    f.fix = o.up == 4 && !options.target ? "--fix turns it; or give retarget --source-up z"
-                                         : "--fix turns it";
+    if (o.up_sure >= kSure || options.target) {
+      f.fix = o.up == 4 && !options.target ? "--fix turns it; or give retarget --source-up z"
+                                           : "--fix turns it";
+    } else {
+      // Somebody who crawls or lies looks like that, too, and a target has to stand.
+      f.what = cat(kDirections[o.up], " may be up, not +y");
+      f.fix = cat("--fix leaves it as it is; say --up=", kDirections[o.up], " if so");
+      d.orientation = seen.vote.result(2);
+      d.orientation.up_sure = kUnsure;
+    }
   }
   d.say(f);
 }
@@ -177,7 +187,25 @@ Finding height_finding(const Diagnosis& d) {
   return f;
 }
 
-void judge_frame(Diagnosis& d, double lowest, double highest) {
+/// Turns the frame so that a floor in view is level, and at 0: that says more exactly which way is
+/// up than a person does.
+void level(Diagnosis& d, const std::vector<FlatPlane>& planes, Similarity& t) {
+  for (const FlatPlane& plane : planes) {
+    if (plane.normal.dot(direction(d.orientation.up)) < kNearlyLevel) continue;
+    const Vec3 normal = t.rotation * plane.normal;
+    const double tilt = std::acos(std::clamp(normal.y(), -1.0, 1.0)) * 180 / 3.14159265358979;
+    if (tilt < kTiltMatters) return;
+    t.rotation =
+        Eigen::Quaterniond::FromTwoVectors(normal, Vec3::UnitY()).toRotationMatrix() * t.rotation;
+    t.offset = plane.offset * plane.normal;
+    d.say({"tilt", Weight::note, "the floor is tilted by " + number(std::round(tilt)) + " degrees",
+           0.95, "the plane under the person", "--fix levels it"});
+    return;
+  }
+}
+
+void judge_frame(Diagnosis& d, double lowest, double highest,
+                 const std::vector<FlatPlane>& planes) {
   if (d.unit.sure < kUnsure || d.orientation.up_sure < kUnsure) {
     d.say({"transform", Weight::note, "how to bring it into our frame cannot be told", 1,
            "units or up axis are unsure", ""});
@@ -191,6 +219,7 @@ void judge_frame(Diagnosis& d, double lowest, double highest) {
   d.height = t.scale * (highest - lowest);
   const double floor = t.scale * lowest;
   if (std::abs(floor) > kFloorMatters) t.offset = lowest * direction(d.orientation.up);
+  level(d, planes, t);
   d.transform = t;
   d.say(height_finding(d));
   Finding f{"floor", Weight::fact, "at 0", 1, "lowest points of the person", ""};
@@ -218,7 +247,8 @@ void judge_path(Diagnosis& d, const Points& points) {
 void judge_plane(Diagnosis& d, const Parts& parts, const std::string& where) {
   if (parts.flat == 0) return;
   const double share = static_cast<double>(parts.flat) / static_cast<double>(parts.part.size());
-  const bool level = std::abs(parts.flat_normal.dot(direction(d.orientation.up))) > 0.8;
+  const bool level =
+      std::abs(parts.planes[0].normal.dot(direction(d.orientation.up))) > kNearlyLevel;
   const char* what = d.orientation.up_sure < kUnsure ? "a floor or a wall"
                      : level                         ? "a floor"
                                                      : "a wall";

@@ -218,7 +218,7 @@ Parts find_parts(const Points& points, const std::optional<Point>& before) {
   for (size_t& i : out.judged) i = number[i];
   out.part = std::move(part);
   out.flat = planes.points;
-  out.flat_normal = planes.normal;
+  out.planes = planes.planes;
   return out;
 }
 

@@ -4,7 +4,7 @@
 #include <optional>
 #include <vector>
 
-#include "nn/geometry/body.h"
+#include "datasets/doctor/planes.h"
 
 namespace restage {
 
@@ -15,7 +15,7 @@ struct Parts {
   size_t stray = 0;        ///< points with hardly a neighbour
   size_t other = 0;        ///< points of pieces apart from the person
   size_t flat = 0;         ///< points of a floor or walls; they are Part::other, not of `other`
-  Vec3 flat_normal = Vec3::Zero();  ///< of the first of these planes, towards the person
+  std::vector<FlatPlane> planes;  ///< these floors and walls
   /// Points that were judged, evenly spread over what there is; the rest go with their nearest.
   std::vector<size_t> judged;
   size_t largest_other = 0;  ///< judged points of the largest such piece; many: a second person

@@ -159,7 +159,7 @@ Planes find_planes(const Points& points) {
     if (static_cast<double>(left.size()) < kRest * static_cast<double>(points.size())) break;
     out.on = std::move(on);
     out.points = points.size() - left.size();
-    if (round == 0) out.normal = plane->normal;
+    out.planes.push_back({plane->normal, plane->offset});
   }
   return out;
 }

@@ -7,10 +7,15 @@
 
 namespace restage {
 
+struct FlatPlane {
+  Vec3 normal = Vec3::Zero();  ///< towards the person
+  double offset = 0;           ///< normal . x of its points
+};
+
 struct Planes {
-  std::vector<bool> on;        ///< one for each point
-  size_t points = 0;           ///< how many are
-  Vec3 normal = Vec3::Zero();  ///< of the first plane found, towards the person
+  std::vector<bool> on;           ///< one for each point
+  size_t points = 0;              ///< how many are
+  std::vector<FlatPlane> planes;  ///< the one with most points first
   bool any() const { return points > 0; }
 };
 

@@ -65,7 +65,7 @@ class Sequence {
     }
     // Most of the time somebody stands; a few frames under the floor are noise.
     std::sort(low.begin(), low.end());
-    judge_frame(d_, low[low.size() / 4], high);
+    judge_frame(d_, low[low.size() / 4], high, flattest_.planes);
     judge_speed();
     judge_repeats();
     judge_numbers();
@@ -109,6 +109,7 @@ class Sequence {
     const PersonShape shape = shape_of({frame.points, frame.faces});
     seen_.vote.add(shape.points, index < kFacingFrames);
     sizes_.push_back(shape.size);
+    at_.push_back(index);
     std::array<double, 12> ends;
     for (int i = 0; i < 6; ++i) {
       ends[2 * i] = quantile(shape.points, direction(i), kLevel);
@@ -181,14 +182,11 @@ class Sequence {
       if (std::abs(std::log(ratio)) > std::abs(std::log(factor))) factor = ratio;
     }
     if (at.empty()) return true;
-    // A frame or two with something else in view are no other unit.
-    const auto size_of = [&](size_t begin, size_t end) {
-      std::vector<double> sizes;
-      for (size_t i = begin; i < end; ++i) sizes.push_back(double{frames_[i].size});
-      return median(std::move(sizes));
-    };
-    const size_t turn = at[0];
-    const bool lasts = jumps(size_of(0, turn), size_of(turn, frames_.size()));
+    const int64_t all = std::ssize(frames_), turn = at[0];
+    // A few frames with something else in view are no other unit.
+    const bool few = std::min(turn, all - turn) < std::min<int64_t>(kSourceFrames, all / 3);
+    const bool lasts = !few && jumps(person_size(0, turn), person_size(turn, all));
+    if (!lasts) leave_out_front();
     d_.say({"sizes", lasts ? Weight::wrong : Weight::note,
             "the size changes by a factor of " + number(std::max(factor, 1 / factor)) + " before " +
                 (at.size() == 1 ? "frame " : "frames ") + frame_list(at),
@@ -196,6 +194,27 @@ class Sequence {
             lasts ? "bring all frames into one unit, or leave the odd ones out"
                   : "look at these frames"});
     return !lasts;
+  }
+
+  /// Median size of the person alone in frames begin to end - 1, or of all points where none of
+  /// them was looked at closely.
+  double person_size(int64_t begin, int64_t end) const {
+    std::vector<double> sizes;
+    for (size_t k = 0; k < at_.size(); ++k)
+      if (at_[k] >= begin && at_[k] < end) sizes.push_back(sizes_[k]);
+    const bool none = sizes.empty();
+    for (int64_t i = begin; i < end && none; ++i)
+      sizes.push_back(double{frames_[static_cast<size_t>(i)].size});
+    return median(std::move(sizes));
+  }
+
+  /// First frames with something else in them, for which no frame before can stand in.
+  void leave_out_front() {
+    const int64_t all = std::ssize(frames_), most = std::min<int64_t>(kSourceFrames, all / 3);
+    const double usual = person_size(0, all);
+    while (d_.odd_front < most && jumps(person_size(d_.odd_front, d_.odd_front + 1), usual))
+      ++d_.odd_front;
+    if (d_.odd_front == most) d_.odd_front = 0;
   }
 
   /// Where the person goes, as further evidence of where they face.
@@ -288,12 +307,12 @@ class Sequence {
       }
       return out;
     };
-    const bool filled = std::all_of(d_.gap.begin(), d_.gap.end(),
-                                    [&](const auto& gap) { return d_.is_filled(gap.second); });
+    const bool kept = std::all_of(d_.gap.begin(), d_.gap.end(),
+                                  [&](const auto& gap) { return d_.is_kept(gap.second); });
     const std::string fix =
-        filled ? "--fix puts the nearest frame in their place, so that the timing is right"
-               : "--fix fills gaps of up to a second with the nearest frame and keeps frames "
-                 "without points in longer ones; cut the sequence there";
+        kept ? "--fix puts frames without points in their place, so that the timing is right; "
+               "retarget fills up to a third of a second of them"
+             : "a gap of over a minute is closed by --fix; cut the sequence there";
     if (!empty.empty())
       d_.say({"missing frames", Weight::note,
               counted(count(true), "frame") + " without any point, before " + frame_list(empty), 1,
@@ -362,7 +381,8 @@ class Sequence {
   Diagnosis d_;
   std::vector<Summary> frames_;
   Seen seen_;
-  std::vector<double> sizes_;
+  std::vector<double> sizes_;  // of the person alone, of frames at_
+  std::vector<int64_t> at_;
   std::vector<std::array<double, 12>> ends_;  // lowest and highest along each direction
   size_t looked_ = 0, fewest_distinct_ = SIZE_MAX, points_ = 0, repeats_ = 0, repeat_frames_ = 0;
   size_t non_finite_ = 0, non_finite_frames_ = 0;

@@ -186,13 +186,28 @@ InputError usage_error(const CLI::App& app, const CLI::ParseError& error) {
   return InputError("", in_plain_words(command, error), help);
 }
 
-/// Results are files or folders, of every command.
-void check_out(const CLI::App& command) {
+[[noreturn]] void refuse_empty(const std::string& option) {
+  throw InputError("", option + " is empty",
+                   option == "--out" ? "give the name of a file or folder to write"
+                                     : "give a value, or leave it out");
+}
+
+/// The parser would take the next word for the value of "--out=".
+void check_words(std::span<char*> words) {
+  for (const std::string_view word : words)
+    if (word.starts_with("--") && word.find('=') == word.size() - 1)
+      refuse_empty(std::string(word.substr(0, word.size() - 1)));
+}
+
+/// No option means anything with an empty text, and results are files or folders.
+void check_values(const CLI::App& command) {
+  for (const CLI::Option* option : command.get_options())
+    if (!option->get_positional())
+      for (const std::string& value : option->results())
+        if (value.empty()) refuse_empty(option->get_name());
   const CLI::Option* out = command.get_option_no_throw("--out");
-  if (out == nullptr || out->count() == 0) return;
-  const std::string& place = out->results().back();
-  if (place.empty() || place == "-")
-    throw InputError("", place.empty() ? "--out is empty" : "--out cannot be standard output",
+  if (out != nullptr && out->count() > 0 && out->results().back() == "-")
+    throw InputError("", "--out cannot be standard output",
                      "give the name of a file or folder to write");
 }
 
@@ -268,6 +283,7 @@ int Program::run(int argc, char** argv) {
   common_.command_line.assign(argv, argv + argc);
   if (argc > 0) common_.command_line[0] = "restage";  // not where it lies on this machine
   try {
+    check_words(std::span(argv, static_cast<size_t>(argc)));
     app_->parse(argc, argv);
   } catch (const CLI::CallForVersion& version) {
     const std::span<char*> words(argv, static_cast<size_t>(argc));
@@ -286,7 +302,7 @@ int Program::run(int argc, char** argv) {
   if (common_.threads < 0 || common_.threads > kMaxThreads)
     throw InputError("", "--threads " + std::to_string(common_.threads) + " is out of range",
                      "give a number from 0 (all cores) to " + std::to_string(kMaxThreads));
-  check_out(innermost(*app_));
+  check_values(innermost(*app_));
   common_.seed_given = innermost(*app_).count("--seed") > 0;
   set_threads(common_.threads);
   set_log_level(common_.quiet     ? LogLevel::quiet

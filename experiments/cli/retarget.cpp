@@ -148,6 +148,7 @@ class Run {
   void push(const SourceCloud& cloud) {
     const Clock::time_point start = Clock::now();
     std::optional<InputError> fault = fault_of(cloud, c_.options.force);
+    if (!fault && watch_) watch_->look(cloud.frame.points, cloud.frame.source);
     std::span<const RetargetedFrame> made;
     if (!fault) try {
         made = system_.push(cloud.frame.points, cloud.frame.source);
@@ -155,11 +156,15 @@ class Run {
         fault = unusable;
       }
     if (fault) {
+      // Somebody may have come, or the source may go on in another way.
+      if (clear_ && !c_.options.force) watch_.emplace(frame_of(source_.record()));
+      clear_ = false;
       gaps_.add(in_, *fault);
       system_.miss();
       return;
     }
     gaps_.end();
+    clear_ = true;
     const Clock::time_point pushed = Clock::now();
     write(made);
     const double write = seconds_since(pushed), work = seconds_since(start);
@@ -198,6 +203,8 @@ class Run {
   Profile& profile_;
   const bool from_memory_;
   std::optional<Sink> sink_;
+  std::optional<SourceWatch> watch_;
+  bool clear_ = true;  // the last cloud could be used
   Outcome out_;
   int64_t in_ = 0;  // frame of the source
   double read_ = 0;
@@ -388,6 +395,8 @@ SystemInput load_input(const RetargetCommand& c, const Common& common) {
   input.options.seed = common.seed;
   input.target_name = c.target;
   const SystemType& type = system_type(c.system);
+  if (!c.rest.empty() && !type.own_skin)  // it moves vertices without joints
+    throw InputError("", "--rest says nothing to --system " + type.name, "leave it out");
   if (c.weights.empty() && type.roles.empty()) return input;
   const std::string weights = c.weights.empty() ? standard_weights() : c.weights;
   input.weights_name = weights_path(weights);

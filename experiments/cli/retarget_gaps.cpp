@@ -2,17 +2,13 @@
 
 #include <algorithm>
 
+#include "experiments/text.h"
+
 namespace restage::cli {
 namespace {
 
 constexpr double kLongestGap = 1.0 / 3;  // seconds
 constexpr size_t kListedGaps = 5;        // in a line of the log
-
-/// What is wrong, without how to mend it.
-std::string cause_of(const InputError& fault) {
-  const std::string text = fault.what();
-  return text.substr(0, text.rfind("; "));
-}
 
 /// "1, 2, 3, 4, 5 and 7 more".
 template <class Items, class Text>
@@ -39,13 +35,16 @@ void Gaps::add(int64_t frame, const InputError& fault) {
   if (frames_ == 1) throw fault;
   if (!any_used_)
     throw InputError("", cause_of(fault) + ", and it is the first frame",
-                     "begin with a good one, or --force to fill what is missing before it");
+                     mend_of(fault) +
+                         "where others are good, begin with one, or --force, which "
+                         "fills what is missing before it");
   if (open_ <= longest_) return;
   const Missing& first = all_[all_.size() - open_];
   throw InputError("",
                    cause_of(first.fault) + ", and the " + std::to_string(longest_) +
                        " frames after it cannot be used either: a gap of over a third of a second",
-                   "cut the source there, or --force to fill the gap from the frames around it");
+                   "see what 'restage doctor' says of it, cut the source there, or --force, which "
+                   "fills what is empty or damaged and takes the rest");
 }
 
 void Gaps::end() {

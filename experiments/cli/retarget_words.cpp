@@ -67,14 +67,21 @@ void say_take(const SkeletonTake& take) {
 }
 
 void warn_if_unsure(const std::string& source, std::vector<double> confidence) {
-  constexpr double kUnsure = 0.4;
+  constexpr double kUnsure = 0.4, kLost = 0.25;
+  constexpr int64_t kMany = 10;  // fewer are hard to see
   if (confidence.empty()) return;
+  const int64_t lost =
+      std::count_if(confidence.begin(), confidence.end(), [](double sure) { return sure < kLost; });
   const auto middle = confidence.begin() + std::ssize(confidence) / 2;
   std::nth_element(confidence.begin(), middle, confidence.end());
   if (*middle < kUnsure)
     log_warning(source + format(": the networks are unsure of most frames (median confidence "
                                 "%.2f); do they show one whole person, y up, in metres?",
                                 *middle));
+  else if (lost > kMany)
+    log_warning(source + format(": in %lld frames nobody can be made out (confidence below %.2f); "
+                                "see what 'restage doctor' says of it",
+                                static_cast<long long>(lost), kLost));
 }
 
 }  // namespace restage::cli

@@ -14,6 +14,7 @@
 #include "experiments/cli/output.h"
 #include "experiments/cli/retarget_words.h"
 #include "experiments/cli/standard_weights.h"
+#include "experiments/text.h"
 #include "nn/models/extraction.h"
 #include "nn/weights/bundle.h"
 
@@ -92,24 +93,43 @@ int run_skeleton(const SkeletonOptions& given, const Common& common) {
   JointExtractor extract(model, options.samples, kAllAround, false, true);
   size_t left_out = 0;
   std::vector<double> sure;
+  std::optional<SeenJoints> last;
+  std::vector<int64_t> filled;  // frames of the result
+  int64_t row = 0, empty = 0;
   while (const auto frame = frames->next()) {
     throw_if_stopped();
-    if (frame->fault) throw *frame->fault;
+    if (frame->fault)
+      throw InputError("", cause_of(*frame->fault),
+                       "leave the frame out, as 'restage doctor --fix OUT' does");
+    if (frame->points.empty() && frames->frames() > 1) {
+      ++empty;
+      if (writer && last) {
+        filled.push_back(row++);
+        write(last->joints, radius_of(*last), writer.get());
+      }
+      continue;
+    }
     check_frame(frame->points, frame->source, FrameMends::none);
     left_out += frame->left_out;
     SeenJoints seen = extract(frame->points, frame->source, key);
     if (seen.uncertainty) sure.push_back(confidence(*seen.uncertainty));
     if (convert) seen.joints = (*convert)(seen.joints);
     const auto radius = radius_of(seen);
-    if (writer) write(seen.joints, radius, writer.get());
+    if (writer) write(seen.joints, radius, writer.get()), ++row;
     if (common.json) {
       list.push_back({{"source", frame->source}, {"joints", json_of(seen.joints)}});
       if (radius) list.back()["radius"] = *radius;
     } else if (!writer) {
       text += frame->source + "\n" + text_of(seen.joints, radius);
     }
+    last = std::move(seen);
   }
+  if (!last) throw InputError(options.input, "holds no points", "give at least one cloud");
+  if (writer) writer->set_filled(filled);
   if (writer) writer->commit();
+  if (empty > 0)
+    log_warning(options.input + ": " + std::to_string(empty) + " frames have no points" +
+                (filled.empty() ? "" : "; the frame before stands in (/filled)"));
   for (const std::string& remark : frames->remarks()) log_info(options.input + ": " + remark);
   if (left_out > 0)
     log_info(options.input + ": left out " + std::to_string(left_out) +

@@ -31,14 +31,23 @@ double metres_per_unit(const std::string& text) {
   return value;
 }
 
+void add_source_up(CommandOptions app, SourceRecord& how) {
+  app.add_text(
+      "--source-up",
+      [&how](const std::string& axis) {
+        how.up = axis;
+        how.up_known = true;
+      },
+      "the source's axis that points up: x, -x, y, -y, z or -z (default: y)");
+}
+
 void add_source_options(CommandOptions app, SourceRecord& how) {
   app.add_option("--clip", how.clip,
                  "animation of a glTF source (default: the first), or motion of a file of motions");
   app.add_option("--sequence", how.sequence, "which sequence of an HDF5 source, from 0");
   app.add_option("--fps", how.fps,
                  "frames per second of the source (default: the file's, else 30)");
-  app.add_option("--source-up", how.up, "the source's axis that points up: x, -x, y, -y, z or -z")
-      .show_default();
+  add_source_up(app, how);
   add_scale(app, how.scale, "the source's units in metres");
 }
 

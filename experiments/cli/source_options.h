@@ -20,6 +20,9 @@ Option add_scale(CommandOptions app, Value& value, const std::string& help) {
       help + "; a number or mm, cm, m, in, ft");
 }
 
+/// --source-up of all commands that read clouds.
+void add_source_up(CommandOptions app, SourceRecord& how);
+
 /// --fps, --source-up, --scale, --clip and --sequence of a source of clouds or of a character.
 void add_source_options(CommandOptions app, SourceRecord& how);
 

@@ -215,7 +215,7 @@ class Stream {
     }
   }
 
-  SourceWatch new_watch() const { return SourceWatch({c_.how.source.scale, c_.how.source.up}); }
+  SourceWatch new_watch() const { return SourceWatch(frame_of(c_.how.source)); }
 
   /// More points than a network looks at cost time and say nothing new.
   void thin() {
@@ -394,9 +394,7 @@ void add_stream(Program& program) {
                  "character, and its WebSocket");
   app.add_option("--seconds", c.seconds, "ends after so many seconds (default: with the input)");
   add_weights_options(app, c.how);
-  app.add_option("--source-up", c.how.source.up,
-                 "the clouds' axis that points up: x, -x, y, -y, z or -z")
-      .show_default();
+  add_source_up(app, c.how.source);
   add_scale(app, c.how.source.scale, "the clouds' units in metres");
   add_system_options(app, c.how);
   app.add_flag("--force", c.how.options.force,

@@ -76,6 +76,9 @@ Request read_request(const TrainArguments& arguments, const Common& common) {
     } else if (a.find('=') != std::string::npos) {
       out.overrides.push_back(a);
     } else if (out.config.empty()) {
+      if (fs::is_directory(a) && fs::exists(fs::path(a) / "config.yaml"))
+        throw InputError(a, "is the folder of a training",
+                         "say resume=" + a + " to go on with it, or give its config.yaml");
       out.config = config_file(a);
     } else {
       throw InputError("", "there are two configurations, '" + out.config + "' and '" + a + "'",

@@ -1,6 +1,7 @@
 // restage weights: what a weights file holds; single models into and out of it.
 
 #include "autograd/base/error.h"
+#include "autograd/base/log.h"
 #include "autograd/base/output_check.h"
 #include "experiments/cli/commands.h"
 #include "experiments/cli/output.h"
@@ -51,7 +52,7 @@ int run_show(const std::string& path, const Common& common) {
 
 struct Transfer {
   std::string from, model, map, out, with, role;
-  std::vector<std::string> sizes;
+  std::vector<std::string> sizes, settings;
 };
 
 /// All that does not fit goes to standard output, since the error has but one line.
@@ -73,6 +74,35 @@ void check_ahead(const Transfer& t, const TrainedModel& model) {
     throw InputError(t.from, "does not look ahead", "leave --role out");
 }
 
+/// What the state dict does not say of itself is as in the model of --with that it replaces: sizes,
+/// where those of the paper do not fit, and settings, such as what the motion network's path means.
+TrainedModel imported(const Transfer& t, const TensorFile& state, const TrainedModel* like) {
+  TrainedModel model;
+  try {
+    model = import_model(t.model, t.sizes, state, t.from);
+  } catch (const StateError&) {
+    if (like == nullptr || !t.sizes.empty()) throw;
+    model = *like;
+    model.settings.clear();
+    model.net = make_model(like->model, like->config, Init{RngKey{}, DType::f32});
+    load_state(*model.net, state, "", t.from);
+  }
+  for (const std::string& setting : t.settings) {
+    const size_t equals = setting.find('=');
+    if (equals == std::string::npos || equals == 0)
+      throw InputError("", "'" + setting + "' is no setting", "give NAME=VALUE");
+    model.settings[setting.substr(0, equals)] = setting.substr(equals + 1);
+  }
+  if (like == nullptr) return model;
+  std::string kept;
+  for (const auto& [name, value] : like->settings)
+    if (model.settings.emplace(name, value).second)
+      kept += (kept.empty() ? "" : ", ") + name + "=" + value;
+  if (!kept.empty())
+    log_info("as the model that it replaces: " + kept + " (--setting says otherwise)");
+  return model;
+}
+
 /// A file may be extended in place: --with and --out may be the same.
 int run_weights_import(const Transfer& t, const Common& common) {
   check_output(t.out, {t.from, t.map});
@@ -83,10 +113,13 @@ int run_weights_import(const Transfer& t, const Common& common) {
   if (!t.map.empty()) state = NameMap::read(t.map).apply(state, t.from);
   Bundle models;
   if (!t.with.empty()) models = load_bundle(t.with);
+  const std::string role = t.role.empty() ? model_type(t.model).role : t.role;
+  const TrainedModel* like = models.find(role);
+  if (like != nullptr && like->model != t.model) like = nullptr;
   try {
-    TrainedModel model = import_model(t.model, t.sizes, state, t.from);
+    TrainedModel model = imported(t, state, like);
     check_ahead(t, model);
-    models.put(t.role.empty() ? model_type(t.model).role : t.role, std::move(model));
+    models.put(role, std::move(model));
   } catch (const StateError& e) {
     print_misfits(e, common);
     throw;
@@ -111,7 +144,7 @@ void add_import(Program& program, CommandOptions group) {
       "restage weights import --from s.safetensors --model smrm/rot6d --size hidden=256 --out "
       "w.safetensors\n"
       "restage weights import --from smrm.safetensors --map names.yaml --model smrm/rot6d "
-      "--with w.safetensors --out all.safetensors\n"
+      "--with w.safetensors --setting remove_heading=false --out all.safetensors\n"
       "restage weights import --from late.safetensors --model smrm/hybrid --role motion.late "
       "--with w.safetensors --out all.safetensors",
       run_weights_import);
@@ -121,11 +154,18 @@ void add_import(Program& program, CommandOptions group) {
   app.add_option("--map", t.map, "YAML lines \"foreign name: our name\", * for any text");
   app.add_option("--size", t.sizes, "a size unlike the paper's, such as hidden=256")
       .one_at_a_time();
+  app.add_option("--setting", t.settings,
+                 "how it was trained, such as translation=velocity (default: what its file says, "
+                 "else as the model of --with that it replaces)")
+      .one_at_a_time();
   app.add_option(
       "--role", t.role,
       "what it is for, where the model may be several things: motion, or motion.late for "
       "one that looks ahead, which 'restage retarget' then prefers");
-  app.add_option("--with", t.with, "weights file whose other models are kept");
+  app.add_option(
+      "--with", t.with,
+      "weights file whose other models are kept, and sizes and settings of the model that is "
+      "replaced");
   app.add_option("--out", t.out, "weights file to write").required();
 }
 

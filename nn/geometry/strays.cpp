@@ -22,7 +22,7 @@ size_t leave_out_strays(const Points& cloud, Points* kept) {
   };
   const auto strays =
       cloud.size() - static_cast<size_t>(std::count_if(cloud.begin(), cloud.end(), near));
-  if (strays > std::max<size_t>(1, cloud.size() / 100) || strays == 0) return 0;
+  if (strays > std::max<size_t>(1, cloud.size() / kStrayShare) || strays == 0) return 0;
   kept->clear();
   std::copy_if(cloud.begin(), cloud.end(), std::back_inserter(*kept), near);
   return strays;

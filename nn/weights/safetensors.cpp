@@ -330,6 +330,9 @@ std::string safetensors_bytes(const TensorFile& file) {
   if (!file.metadata.empty()) header["__metadata__"] = file.metadata;
   uint64_t at = 0;
   for (const auto& [name, t] : file.tensors) {
+    if (name == "__metadata__")
+      throw InputError("", "no tensor of a safetensors file can be called __metadata__",
+                       "rename it");
     Json shape = Json::array();
     for (int i = 0; i < t.rank(); ++i) shape.push_back(t.size(i));
     const uint64_t end = at + static_cast<uint64_t>(t.numel()) * size_of(t.dtype());

@@ -33,7 +33,7 @@ def command(name, *words, **options):
 
     restage.command("info", "skeleton/pointnet")["parameters"]; options are the program's, with _ for -.
     """
-    text = _core.run(name, *words, "--json", *_core.words_of(options))
+    text = _core.run(name, *words, **options)
     return _json.loads(text) if text.strip() else {}
 
 

@@ -10,7 +10,7 @@ from . import _core
 
 
 def _command(name, *words, **options):
-    return json.loads(_core.run(name, *words, "--json", *_core.words_of(options)))
+    return json.loads(_core.run(name, *words, **options))
 
 
 def _words(overrides):

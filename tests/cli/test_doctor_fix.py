@@ -291,13 +291,23 @@ class DoctorFix(CliTest):
         self.h5("utm.h5", points=([len(far), 3], flat), frame_offset=([2], [0, len(far)], "int64"))
         self.bad_input(["doctor", "utm.h5"], "from the origin", "subtract")
 
-    def test_gaps_that_are_not_filled_are_said(self):
-        for i, cloud in enumerate(self.walk()):
-            self.ply("gap/f%d.ply" % (i if i < 6 else i + 40), cloud)
-        found = self.fix("gap", "out.h5", 0)
-        fix = [f["fix"] for f in found["findings"] if f["topic"] == "missing frames"]
-        self.assertIn("up to a second", fix[0])
-        self.assertEqual(self.json("data", "inspect", "out.h5")["counts"]["frames"], 12)
+    def test_gaps_keep_their_time(self):
+        for missing, frames, words in ((4, 16, "frames without points"), (40, 52, "frames without points"), (2000, 12, "over a minute")):
+            for i, cloud in enumerate(self.walk()):
+                self.ply("gap%d/f%d.ply" % (missing, i if i < 6 else i + missing), cloud)
+            found = self.fix("gap%d" % missing, "out.h5", 0)
+            fix = [f["fix"] for f in found["findings"] if f["topic"] == "missing frames"]
+            self.assertIn(words, fix[0])
+            self.assertIn(words, " ".join(found["fixed"]["remarks"]))
+            self.assertEqual(self.json("data", "inspect", "out.h5")["counts"]["frames"], frames)
+
+    def test_first_frames_of_something_else_are_left_out(self):
+        clouds = self.walk()
+        clouds[0] = [(3 * x, 3 * y, 3 * z) for x, y, z in clouds[0]]
+        self.frames("first", clouds)
+        found = self.fix("first", "out.h5", 0)
+        self.assertIn("the first 1 frame, of another size", " ".join(found["fixed"]["remarks"]))
+        self.assertEqual(self.json("data", "inspect", "out.h5")["counts"]["frames"], 11)
 
     def pixels(self, name):
         """Rows of RGB of a PNG."""

@@ -80,7 +80,7 @@ class Frames(CliTest):
         for out, frames in (("mended.h5", 50), ("mended/", 50)):
             result = self.restage("doctor", "in", "--json", "--fix", out, *known)
             self.assertIn(result.code, (0, 1), result.err)
-            self.assertIn("35 frames without points stay", " ".join(json.loads(result.out)["fixed"]["remarks"]))
+            self.assertIn("in gaps 35 frames without points", " ".join(json.loads(result.out)["fixed"]["remarks"]))
         self.assertEqual(self.json("data", "inspect", "mended.h5")["counts"]["frames"], 50)
         self.assertEqual(self.json("data", "verify", "mended.h5")["problems"], [])
         self.assertEqual(len(os.listdir(self.path("mended"))), 50)

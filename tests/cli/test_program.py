@@ -102,6 +102,8 @@ class Usage(CliTest):
         self.bad_input(["doctor", "x", "--seed", str(2 ** 64)], "--seed")
         for out in ("", "-"):
             self.bad_input(["skeleton", "--weights", "w", "--input", "x", "--out", out], "--out")
+        for empty in (["--weights", ""], ["--weights="]):
+            self.bad_input(["skeleton", *empty, "--input", "x"], "--weights is empty")
         self.bad_input(["eval", "--pred", "a.h5", "--truth", "b.h5", "--anchor", 1], "--anchor")
         self.bad_input(["eval", "--pred", "a.h5", "--truth", "b.h5", "--out", "x"], "--out")
         self.bad_input(["eval", "run=x", "--every", 2], "--every")

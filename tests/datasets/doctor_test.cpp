@@ -208,6 +208,21 @@ TEST(Doctor, FloorsAndWallsAreNamedAndRemoved) {
   EXPECT_THROW(check_target(cloud(with_plane(person, false)), "hero"), InputError);
 }
 
+TEST(Doctor, AFloorInViewIsLevelled) {
+  for (const double degrees : {-25.0, 0.0, 12.0, 25.0}) {
+    const Mat3 tilt =
+        Eigen::AngleAxisd(degrees * 3.14159265358979 / 180, Vec3::UnitX()).toRotationMatrix();
+    const Mesh mesh = cloud(moved(with_plane(scan(somebody()), false), tilt, 1));
+    const Diagnosis d = examine_surface(mesh);
+    ASSERT_TRUE(d.transform) << degrees;
+    EXPECT_EQ(notes(d, "tilt", "is tilted by"), degrees != 0);
+    EXPECT_GT((d.transform->rotation * tilt).col(1).y(), 0.9995) << degrees;
+    double lowest = 1;
+    for (const Point& p : mended(mesh, d).vertices) lowest = std::min(lowest, double{p.y()});
+    EXPECT_NEAR(lowest, 0, 0.04) << degrees;
+  }
+}
+
 TEST(Doctor, NobodyIsTakenForAFloor) {
   for (int k = 0; k < 22; ++k) {
     const Motion motion = builtin_motion(0, "test", k);

@@ -38,6 +38,28 @@ struct FixedExtractor final : SkeletonModel {
   const char* kind() const override { return "Fixed"; }
 };
 
+TEST(InferRetargeter, BeginsWhereItCanSee) {
+  const auto source = performance(6);
+  std::vector<SeenJoints> seen(source.begin(), source.end());
+  for (size_t f = 0; f < seen.size(); ++f) {
+    seen[f].uncertainty.emplace().fill(f < 2 ? 0.2 : 0.002);
+    if (f < 2)
+      for (Vec3& joint : seen[f].joints) joint = joint * 0.3 + Vec3(2, 0, 0);  // half of somebody
+  }
+  Retargeter r(untrained(), "w", target().rest, target().joints, {.anchor = 0, .foot_lock = false});
+  Retargeter clear(untrained(), "w", target().rest, target().joints,
+                   {.anchor = 0, .foot_lock = false});
+  for (size_t f = 0; f < seen.size(); ++f) {
+    const Vec3 at = r.push_joints(seen[f])[0].pose.root;
+    if (f < 2) {
+      EXPECT_GT((at - clear.push_joints(seen[2])[0].pose.root).norm(), 0.5);
+      clear.restart();
+    } else if (f == 2) {
+      EXPECT_LT((at - clear.push_joints(seen[2])[0].pose.root).norm(), 0.05);
+    }
+  }
+}
+
 TEST(InferRetargeter, WaitsWhereItDoubts) {
   constexpr size_t kReturn = kReturnFrames, kDoubt = 2 + kReturn + 3,
                    kFrames = kDoubt + kReturn + 4;

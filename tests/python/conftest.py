@@ -14,7 +14,7 @@ import pytest
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 PROGRAM = os.environ.get("RESTAGE_PROGRAM", str(ROOT / "build/release/restage"))
 os.environ.pop("LD_PRELOAD", None)  # a sanitizer for this process (tests/CMakeLists.txt), not for the programs it starts
-LITE = str(ROOT / "experiments/weights/lite.safetensors")
+LITE, STANDARD = (str(ROOT / "experiments/weights" / f"{name}.safetensors") for name in ("lite", "standard"))
 
 
 class Program:

@@ -2,6 +2,7 @@
 import copy
 import gc
 import inspect
+import json
 import os
 import pathlib
 import subprocess
@@ -11,6 +12,8 @@ import numpy as np
 import pytest
 import restage
 from restage import ops
+
+from conftest import LITE, STANDARD
 
 rng = np.random.default_rng(2)
 
@@ -129,6 +132,75 @@ def test_wrong_use():
     x.value.assign([1, 2, 3])
     with pytest.raises(restage.WorkError, match="changed"):
         y.backward()
+
+
+def test_a_gradient_is_written_to_alone():
+    tape = restage.Tape()
+    a, b = tape.leaf(np.ones(4, np.float32)), tape.leaf(np.ones(4, np.float32))
+    gradients = ops.sum_all(a + b).backward()
+    for leaf in (a, b):
+        gradients[leaf].assign(gradients[leaf].numpy() * 0.1)
+    assert np.allclose(gradients[a].numpy(), 0.1) and np.allclose(gradients[b].numpy(), 0.1)
+    assert gradients.norm() == pytest.approx(0.1 * 8 ** 0.5, rel=1e-6)
+
+
+def test_gradients_are_of_one_tape():
+    one, other = restage.Tape(), restage.Tape()
+    inner = [ops.square(tape.leaf(f32(n))).keep_gradient() for tape, n in ((one, 3), (other, 7))]
+    gradients = ops.sum_all(inner[0]).backward()
+    assert gradients[inner[0]].shape == (3,) and gradients[inner[1]] is None
+    with pytest.raises(restage.ShapeError, match="detach"):
+        other.leaf(inner[1])
+
+
+def test_numbers_beside_values():
+    x = restage.Tape().leaf(f32(1000))
+    assert np.array_equal((x / 3).numpy(), x.numpy() / np.float32(3))
+    tiny = restage.Tape().leaf(np.array([1e-30], np.float32))
+    assert (tiny / 1e-40).item() == pytest.approx(1e10, rel=1e-4)
+    for two in (2, 2.0, np.int64(2), np.float32(2), np.float64(2)):
+        assert np.array_equal((x * two).numpy(), (two * x).numpy())
+        assert np.array_equal((x * two).numpy(), x.numpy() * 2)
+    shape = (np.int64(10), np.prod((10, 10)))
+    assert ops.reshape(x, shape).shape == ops.reshape(x, np.array([10, 100])).shape == (10, 100)
+
+
+def test_numbers_that_ops_refuse():
+    x = f32(1, 4, 4)
+    for call in (lambda: ops.dropout(x, -1), lambda: ops.bce_with_logits(x, 2), lambda: ops.bce_with_logits(x, np.nan),
+                 lambda: ops.smooth_length(x, -1), lambda: ops.layer_norm(x, f32(4), f32(4), eps=-1),
+                 lambda: ops.unfold(x, 1 << 62, 1, 0, 1), lambda: ops.unfold(x, 1, 1 << 62, 0, 4),
+                 lambda: ops.reshape(x, (True, 16)), lambda: ops.reshape(x, (2.0, 8))):
+        with pytest.raises(restage.ShapeError):
+            call()
+
+
+def test_gradcheck_within_gradcheck():
+    def f(x):
+        restage.gradcheck(ops.square, np.ones(2))
+        return ops.square(x)
+    assert "calls gradcheck" in repr(restage.gradcheck(f, np.ones(2)))
+    assert restage.gradcheck(ops.square, np.ones(2))
+
+
+def test_names_of_tensors(tmp_path):
+    for names in ({"__metadata__": f32(2), "w": f32(2)}, {1: f32(2), "1": f32(2)}):
+        with pytest.raises(restage.InputError, match="name|rename"):
+            restage.save_safetensors(tmp_path / "x.safetensors", names)
+        assert not (tmp_path / "x.safetensors").exists()
+
+
+def test_a_network_goes_back_into_its_weights(tmp_path):
+    """Nothing of what the weights said of it is lost."""
+    for weights, role in ((LITE, "motion"), (STANDARD, "motion.late"), (STANDARD, "skeleton")):
+        net = restage.load_model(weights, role)
+        restage.save_safetensors(tmp_path / "net.safetensors", net.state_dict())
+        restage.command("weights", "import", model=net.name, role=role, out=tmp_path / "new.safetensors",
+                        **{"from": tmp_path / "net.safetensors", "with": weights})
+        (a, said), (b, again) = (restage.load_safetensors(p) for p in (weights, tmp_path / "new.safetensors"))
+        settings = [{name: (model["model"], model["settings"]) for name, model in json.loads(m["restage"])["models"].items()} for m in (said, again)]
+        assert settings[0] == settings[1] and set(a) == set(b)
+        assert all(np.array_equal(a[name].numpy(), b[name].numpy()) for name in a)
 
 
 def test_two_threads():

@@ -43,6 +43,19 @@ def test_unknown_option(walk):
     for name in ("json", "help", "threads", "a=b"):
         with pytest.raises(restage.InputError, match="unknown option"):
             restage.retarget("a", walk / "target.ply", **{name: True})
+    for value in (True, False, np.bool_(False)):
+        with pytest.raises(restage.InputError, match="unknown option '--foot-lok'"):
+            restage.System(walk / "target.ply", foot_lok=value)
+        with pytest.raises(restage.InputError, match="'samples' is (True|False), and needs a value"):
+            restage.retarget("a", walk / "target.ply", samples=value)
+        with pytest.raises(restage.InputError, match="did you mean '--fix'"):
+            restage.command("doctor", "a", fxi=value)
+    for value in (0, "no", 1):
+        with pytest.raises(restage.InputError, match="'foot-lock' is .*give True or False"):
+            restage.retarget("a", walk / "target.ply", foot_lock=value)
+    for word in ("--help", "-h"):
+        with pytest.raises(restage.InputError, match="unknown option '%s'" % word):
+            restage.doctor(word)
 
 
 BAD = [None, 3, "text", [], [[1, 2]], np.zeros((5, 2)), np.zeros((0, 3)), np.zeros(3), np.zeros((4, 3), complex),

@@ -1,4 +1,6 @@
 """restage.retarget, System, skeleton: the program's bits, from files and from arrays."""
+import copy
+import pickle
 import threading
 
 import numpy as np
@@ -83,6 +85,12 @@ def test_push(walk, source, truth):
             assert np.float32(frame.confidence) == truth[0]["confidence"][k]
     assert system.target_vertices.shape == truth[0]["vertices"].shape[1:]
     assert system.rest_joints.shape == (22, 3) and system.source_joints.shape == (22, 3)
+    for other in (pickle.loads(pickle.dumps(frames[1])), copy.copy(frames[1])):
+        same(other, {name: getattr(frames[1], name) for name in ("vertices", "joints", "rotations")})
+        assert (other.confidence, other.filled) == (frames[1].confidence, frames[1].filled)
+    for state in ((), (b"", b"1234", b"", None, False), (b"", b"", b"", None)):
+        with pytest.raises(ValueError):
+            restage.Frame.__new__(restage.Frame).__setstate__(state)
 
 
 def test_threads_change_nothing(walk, source, truth):
