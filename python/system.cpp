@@ -67,7 +67,7 @@ class PySystem {
           return system_->push(cloud, name);
         } catch (const UnusableCloud&) {
           // Somebody may have come.
-          if (clear_) watch_.emplace(frame_of(c_.source));
+          if (clear_) watch_.emplace(frame_of(c_.source), true);
           clear_ = false;
           throw;
         }

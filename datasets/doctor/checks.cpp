@@ -45,18 +45,23 @@ std::string scale_advice(double size, double given) {
                                             : "give --scale " + number(raw.unit.metres);
 }
 
-/// `up`: in the frame that the source was brought into, by its own axis `given`.
-std::string up_advice(int up, const std::string& given) {
+/// A direction of the frame that the source was brought into, by its axis `given`, as the source's.
+std::string own_axis(int up, const std::string& given) {
   const Mat3 back = upright(parse_axis(given, "--source-up")).transpose();
-  const Axis own = axis_near(back * direction(up));
-  return "give --source-up " + to_string(own) + " (--source-up " + given +
+  return to_string(axis_near(back * direction(up)));
+}
+
+std::string up_advice(int up, const std::string& given) {
+  return "give --source-up " + own_axis(up, given) + " (--source-up " + given +
          " where people lie or hang)";
 }
 
 /// What the clouds look like, where somebody said otherwise.
-std::string contradiction(const Finding& f, const SourceFrame& given) {
-  return f.what + " by what the first clouds show (sure " + per_cent(f.sure) +
-         "), but --source-up " + given.up + " was given, and is taken";
+void warn_of_up(const std::string& where, const Diagnosis& d, const Finding& f,
+                const SourceFrame& given) {
+  log_warning(where + "the first clouds look as if " + own_axis(d.orientation.up, given.up) +
+              " were up (sure " + per_cent(f.sure) + "), but --source-up " + given.up +
+              " was given, and is taken");
 }
 
 /// float32 holds coordinates to a centimetre up to here. A stray point may be anywhere, so all
@@ -96,7 +101,7 @@ void check_source(const std::vector<Mesh>& first_frames, const std::string& wher
     // A few frames, alike: less certain than the many that the doctor looks at.
     if (f.topic == "up" && f.sure < kVerySure) continue;
     if (f.topic == "up" && given.up_known) {
-      log_warning(where + ": " + contradiction(f, given));
+      warn_of_up(where + ": ", d, f, given);
       continue;
     }
     if (f.topic == "up") refuse(where, f, up_advice(d.orientation.up, given.up));
@@ -138,8 +143,9 @@ void SourceWatch::judge() {
   for (const Finding& f : d.findings) {
     if (f.weight != Weight::wrong) continue;
     if (f.topic == "up" && f.sure >= kVerySure) {
+      if (again_) continue;
       if (given_.up_known) {
-        log_warning(contradiction(f, given_));
+        warn_of_up("", d, f, given_);
         continue;
       }
       wrong_ = f;

@@ -111,7 +111,9 @@ void check_target(const Mesh& target, const std::string& where, ExamineOptions o
 /// comes cloud by cloud.
 class SourceWatch {
  public:
-  explicit SourceWatch(SourceFrame given = {}) : given_(std::move(given)) {}
+  /// `again`: clouds were taken before, so that the axes are known: who lies now fell.
+  explicit SourceWatch(SourceFrame given = {}, bool again = false)
+      : given_(std::move(given)), again_(again) {}
   /// Takes the next cloud, already in metres, y up, as given. InputError with the kSourceFrames-th
   /// cloud and those after it: for good where these clouds stand up along another axis; where they
   /// show more than one person, until as many clouds in a row show no more. Then it looks no more.
@@ -123,6 +125,7 @@ class SourceWatch {
   void judge();
 
   SourceFrame given_;
+  bool again_;
   std::vector<Mesh> clouds_;
   bool settled_ = false;
   std::optional<Finding> wrong_;

@@ -156,8 +156,9 @@ class Run {
         fault = unusable;
       }
     if (fault) {
-      // Somebody may have come, or the source may go on in another way.
-      if (clear_ && !c_.options.force) watch_.emplace(frame_of(source_.record()));
+      // Somebody may have come.
+      if (clear_ && !c_.options.force && !cloud.frame.points.empty())
+        watch_.emplace(frame_of(source_.record()), true);
       clear_ = false;
       gaps_.add(in_, *fault);
       system_.miss();

@@ -128,7 +128,7 @@ class Stream {
          live::Mailbox& box, live::Words& words)
       : c_(c),
         to_ours_(c.how.source.scale, c.how.source.up),
-        watch_(new_watch()),
+        watch_(frame_of(c.how.source)),
         system_(system),
         vmc_(vmc),
         page_(page),
@@ -206,7 +206,7 @@ class Stream {
       going_ = clear_ = true;
       if (!made.empty()) send(made.back());
     } catch (const UnusableCloud& fault) {
-      if (clear_) watch_ = new_watch();  // somebody may have come
+      if (clear_) watch_ = SourceWatch(frame_of(c_.how.source), true);  // somebody may have come
       clear_ = false;
       leave_out(fault);
     } catch (const InputError& fault) {
@@ -214,8 +214,6 @@ class Stream {
       leave_out(fault);
     }
   }
-
-  SourceWatch new_watch() const { return SourceWatch(frame_of(c_.how.source)); }
 
   /// More points than a network looks at cost time and say nothing new.
   void thin() {

@@ -35,8 +35,9 @@ class DoctorFix(CliTest):
         return [[(x, y, z + 0.02 * i) for x, y, z in person] for i in range(12)]
 
     def test_what_can_be_written_is_known_before_anything_is_read(self):
-        for out in ("x.glb", "x.gltf", "x.npz", "x.npy", "x.stl", "x.png", "x.xyz", "x.hdf5", ""):
+        for out in ("x.glb", "x.gltf", "x.npz", "x.npy", "x.stl", "x.png", "x.xyz", "x.hdf5"):
             self.bad_input(["doctor", "nothing.ply", "--fix", out], ".ply or .obj", ".h5", "folder")
+        self.bad_input(["doctor", "nothing.ply", "--fix", ""], "--fix is empty")
         self.frames("walk12", self.walk())
         self.bad_input(["doctor", "walk12", "--fix", "x.ply"], "x.ply", "12 frames", ".h5")
         self.bad_input(["doctor", "walk/target.ply", "--fix", "x.h5"], "surfaces", ".ply")

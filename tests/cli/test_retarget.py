@@ -203,7 +203,7 @@ class DoctorsWords(Retarget):
         self.bad_input(call("--scale", "0.1", source="cm"), "--scale 0.01")
         self.bad_input(call("--scale", "0.01", source="good"), "leave --scale out")
         # Who says where up is is believed, and warned.
-        self.assertIn("--source-up z was given, and is taken", self.done(*call("--source-up", "z", source="good")).err)
+        self.assertIn("--source-up z was given, and is taken", self.restage(*call("--source-up", "z", source="good")).err)
         for scale in ("0", "inf", "nan", "1e300", "1e-30"):
             self.bad_input(call("--scale", scale, source="good"), "--scale")
 

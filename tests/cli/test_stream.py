@@ -250,7 +250,7 @@ class Streams(StreamTest):
                 self.assertEqual(process.returncode, 0, err)
             else:
                 self.assertEqual((process.returncode, out), (2, b""), err)
-                self.assertIn("give --source-up z, or --force", err.decode().splitlines()[-1])
+                self.assertIn("give --source-up z (--source-up y where people lie or hang), or --force", err.decode().splitlines()[-1])
 
     def test_a_second_person_who_leaves(self):
         process = self.stream("-")
@@ -461,10 +461,11 @@ class Streams(StreamTest):
         def call(**other):
             options = {**good, **{"--" + key: value for key, value in other.items()}}
             return ["stream", *(word for pair in options.items() for word in pair)]
-        for port in ("0", "65536", "x", "", "127.0.0.1", "127.0.0.1:", "127.0.0.1:-1", "127.0.0.1:1x"):
+        for port in ("0", "65536", "x", "127.0.0.1", "127.0.0.1:", "127.0.0.1:-1", "127.0.0.1:1x"):
             self.bad_input(call(vmc=port), "--vmc", "port")
-            self.bad_input(call(ws=port or ":"), "--ws", "port")
+            self.bad_input(call(ws=port), "--ws", "port")
             self.bad_input(call(**{"in": "tcp://" + port}), "--in", "port")
+        self.bad_input(call(ws=":"), "--ws", "port")
         self.bad_input(call(vmc="no.such.host.invalid:39539"), "--vmc", "no.such.host.invalid")
         self.bad_input(call(**{"in": "tcp://192.0.2.1:9000"}), "--in", "192.0.2.1")  # no address of this machine
         self.bad_input(call(**{"in": "nowhere"}), "nowhere", "no such folder")
