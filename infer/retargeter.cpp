@@ -79,6 +79,10 @@ class Stopwatch {
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
 };
 
+bool is_clear(const SeenJoints& seen) {
+  return !seen.uncertainty || confidence(*seen.uncertainty) >= kClear;
+}
+
 /// The centre about which A's path is scaled to B's: the origin if A starts near the origin. If A
 /// starts far away, the centre is a place on the floor kNear metres from A. The scale still changes
 /// in the first frames, as the estimate of A's legs does; far from the centre, small changes would
@@ -168,6 +172,8 @@ void Retargeter::restart() {
   back_before_.reset();
   received_.reset();
   frame_ = grid_ = missed_ = answered_ = 0;
+  begun_ = 0;
+  clear_start_ = true;
   legs_a_ = 0;
 }
 
@@ -184,6 +190,7 @@ std::span<const RetargetedFrame> Retargeter::push(const Points& cloud, const std
         received_ && options_.fps / static_cast<double>(missed_ + 1) > kRemembering;
     seen = (*extractor_)(cloud, source, key, remembers ? &*received_ : nullptr);
     if (!options_.force) check_not_lost(seen, source);
+    if (!clear_start_ && is_clear(seen)) bones_ = {};  // B begins once more
     if (options_.steady_bones) seen.joints = bones_(seen.joints, seen.uncertainty);
   }
   const auto out = push_joints(seen);
@@ -312,7 +319,7 @@ void Retargeter::hold_doubtful(const Joints& a, RetargetedFrame* out) {
 /// B begins where A does, in proportion to its legs. If A could not be made out then, B begins once
 /// more in the first clear frame: half of somebody, or another thing, is no place to start from.
 void Retargeter::begin(const SeenJoints& seen) {
-  const bool clear = !seen.uncertainty || confidence(*seen.uncertainty) >= kClear;
+  const bool clear = is_clear(seen);
   if (previous_ && (clear_start_ || !clear)) return;
   const Joints& a = seen.joints;
   const double scale = leg_length(rest_) / std::max(leg_length(a), 1e-6);
@@ -324,7 +331,7 @@ void Retargeter::begin(const SeenJoints& seen) {
     previous_.reset();
     back_before_.reset();
     feet_ = {};
-    legs_a_ = leg_length(a);
+    begun_ = grid_;
   }
   clear_start_ = clear;
 }
@@ -372,8 +379,10 @@ void Retargeter::perform(const MotionOutput& answer, const Joints& a, const Mat3
 /// Moves B's pelvis on by `velocity`, metres a second, and draws it to A's scaled path
 /// (RetargetOptions::anchor): errors of the velocity would carry B ever further away.
 void Retargeter::sum_path(const Joints& a, const Vec3& velocity) {
-  legs_a_ += (leg_length(a) - legs_a_) / static_cast<double>(answered_);
-  if (answered_ == 1) return;
+  const int64_t since = answered_ - begun_;  // frames since B began, this one too
+  if (since < 1) return;                     // shown where B will begin
+  legs_a_ += (leg_length(a) - legs_a_) / static_cast<double>(since);
+  if (since == 1) return;
   root_b_ += velocity / kFps;
   if (!(options_.anchor > 0)) return;
   const double scale = leg_length(rest_) / std::max(legs_a_, 1e-6);

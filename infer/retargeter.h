@@ -132,7 +132,8 @@ class Retargeter final : public System {
   Vec3 root_b_ = Vec3::Zero();                            ///< B's pelvis, before feet are held
   Vec3 centre_a_ = Vec3::Zero(),
        centre_b_ = Vec3::Zero();  ///< centres about which paths are scaled
-  double legs_a_ = 0;             ///< length of A's legs, mean of all frames so far, metres
+  double legs_a_ = 0;             ///< length of A's legs, mean of all frames since begun_, metres
+  int64_t begun_ = 0;             ///< the frame of the grid in which B began
   /// A in the last frames of the grid, a ring of latency + 1 of them: a late answer belongs to the
   /// oldest one. `turn`: A's heading.
   struct Asked {

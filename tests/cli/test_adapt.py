@@ -45,7 +45,7 @@ class Adapt(CliTest):
         self.assertIsNone(json.loads(result.out)["before"]["confidence"])  # lite does not say how sure it is
         self.bad_input([*call, "--source", "frames/"], "held-out")
         for frame in range(4):
-            self.ply("far/f%d.ply" % frame, [(0.1 * k, 0.05 * k, 0) for k in range(90)] + [(1e30, 0, 0), (0, 2e30, 0)])
+            self.ply("far/f%d.ply" % frame, [(0.1 * k, 0.05 * k, 0) for k in range(90)] + [(k * 1e29, 0, 0) for k in range(1, 40)])
         self.bad_input([*call, "--source", "far/", "--force"], "far/f0.ply", "20 m apart")
 
     def test_bad_input(self):

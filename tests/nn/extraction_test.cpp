@@ -55,8 +55,10 @@ TEST(InferExtraction, PointsFarFromThePersonAreLeftOut) {
   const Joints of_few = extract_joints(*model, few, "c", RngKey{3, 0}, 2);
   few.push_back({50, 0, 0});
   EXPECT_EQ(extract_joints(*model, few, "c", RngKey{3, 0}, 2), of_few);
-  some.push_back({0, 0, 5.5f});
-  some.push_back({0, 0, 6});  // five of 405: no mistakes of a sensor, and half a room
+  for (int k = 0; k < 60; ++k) some.push_back({0, 0.01f * static_cast<float>(k), 6});
+  EXPECT_EQ(extract_joints(*model, some, "c", RngKey{3, 0}, 2), alone) << "one in seven";
+  for (int k = 0; k < 60; ++k) some.push_back({0.01f * static_cast<float>(k), 0, 6});
+  // Over a fifth: no mistakes of a sensor, and half a room.
   EXPECT_NE(extract_joints(*model, some, "c", RngKey{3, 0}, 2), alone);
 }
 
