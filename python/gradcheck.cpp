@@ -61,8 +61,7 @@ PyReport check(const py::object& f, const py::args& inputs, const std::string& n
   sample.f32_tolerance = f32_tolerance;
   static std::mutex one_at_a_time;  // it sets how many threads compute
   thread_local bool checking = false;
-  if (checking)
-    throw ShapeError("gradcheck: the function that is checked calls gradcheck");
+  if (checking) throw ShapeError("gradcheck: the function that is checked calls gradcheck");
   const py::gil_scoped_release released;
   const std::lock_guard lock(one_at_a_time);
   checking = true;
