@@ -164,7 +164,7 @@ void mend_frames(const Subject& subject, const Diagnosis& d, Mender& mend, Sink&
     for (int64_t k = 0; previous && k < kept; ++k)
       sink.push({}, std::max(row_before, row - missing + k));
     (previous ? empty : leading) += kept;
-    closed += missing > 0 && kept == 0;
+    closed += !d.is_kept(missing);
     sink.push(mesh, from);
     previous = std::move(mesh);
     row_before = from;
