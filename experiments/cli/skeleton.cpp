@@ -128,7 +128,7 @@ int run_skeleton(const SkeletonOptions& given, const Common& common) {
   if (writer) writer->set_filled(filled);
   if (writer) writer->commit();
   if (empty > 0)
-    log_warning(options.input + ": " + std::to_string(empty) + " frames have no points" +
+    log_warning(options.input + ": " + counted(empty, "frame") + " without points" +
                 (filled.empty() ? "" : "; the frame before stands in (/filled)"));
   for (const std::string& remark : frames->remarks()) log_info(options.input + ": " + remark);
   if (left_out > 0)

@@ -96,6 +96,19 @@ class Gaps(CliTest):
         self.assertIn("the frame before stands in", told)
         self.assertEqual(self.filled("mended.h5")[:2], ([], []))
 
+    def test_somebody_who_comes_later(self):
+        """The first frames alone are looked at in front; who comes behind them is found where the extractor is lost."""
+        self.w = STANDARD
+        both = {f: self.frames[f] + [(x + 1.5, y, z) for x, y, z in self.frames[f]] for f in range(10, FRAMES)}
+        self.bad_input(self.call("new.h5", source=self.source("two", both)), "a second person is in the clouds before", "doctor --fix")
+        self.done(*self.call("new.h5", source="two", force=True))
+
+    def test_missing_numbers_are_told(self):
+        for f, frame in enumerate(self.frames):
+            self.ply("numbers/f%d.ply" % (f if f < 9 else f + 3), frame)
+        self.assertIn("3 numbers are missing", self.restage(*self.call("out.h5", source="numbers")).err)
+        self.assertNotIn("missing", self.restage(*self.call("out.h5")).err)
+
     def test_it_is_said(self):
         self.source("bad", {7: self.frames[0][:10], 8: None})
         result = self.restage(*self.call("out.h5", source="bad"))

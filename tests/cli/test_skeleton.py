@@ -30,6 +30,15 @@ class Joints(Skeleton):
         self.assertIn("left_wrist", text.lower().replace(" ", "_"))
         self.assertIn("seed 0", text)
 
+    def test_frames_without_points(self):
+        for f, cloud in enumerate((self.cloud, [], self.cloud)):
+            self.ply("in/f%d.ply" % f, cloud)
+        self.assertIn("1 frame without points", self.restage("skeleton", "--weights", self.w, "--input", "in", "--out", "j.h5").err)
+        self.assertEqual({k: v for k, v in self.json("data", "inspect", "j.h5")["counts"].items() if k in ("frames", "filled")}, {"frames": 3, "filled": 1})
+        self.assertEqual(len(self.joints("in")), 2)
+        self.write("in/f1.ply", "ply")
+        self.bad_input(["skeleton", "--weights", self.w, "--input", "in"], "in/f1.ply", "doctor --fix")
+
     def test_an_extractor_that_knows_says_how_far_it_may_be_off(self):
         self.ply("a.ply", self.cloud)
         sure = weights("sure", "skeleton.sizes.uncertainty=true", "stages=[skeleton]")
