@@ -81,6 +81,7 @@ class Gaps(CliTest):
             told = self.json("eval", "--pred", "out.h5", "--truth", "good.h5")
             self.assertLess(told["mean"]["mpjpe"], 0.004, name)
             self.assertEqual(self.filled(name, force=True)[:2], ([], []), name)
+            self.assertEqual(self.json("assess", name, "--weights", STANDARD)["left_out"], 1, name)
         # What lasts is no slip of one frame.
         missing, _, _ = self.filled(self.source("lies", {f: [(x, -z, y) for x, y, z in self.frames[f]] for f in range(4, FRAMES)}))
         self.assertEqual(missing, list(range(4, 4 + len(missing))))
