@@ -11,7 +11,7 @@ import yaml
 
 ROOT = pathlib.Path(__file__).resolve().parents[1]
 program, data = (str(pathlib.Path(word).resolve()) for word in sys.argv[1:])
-OTHER_PROGRAM = {"ours_switches", "ours_sensitivity"}  # docs/notes/design/experiments.md, "Identity"
+OTHER_PROGRAM = {"ours_switches", "ours_sensitivity"}  # docs/decisions.md, "Training and sweeps"
 
 
 def run(*words, cwd):
@@ -28,12 +28,12 @@ with tempfile.TemporaryDirectory() as folder:
     run("data", "build", str(ROOT / "configs/data/open_benchmark.yaml"), "out=benchmark", "data=" + data, cwd=folder)
     for name in ("experiments", "configs"):
         (pathlib.Path(folder) / name).symlink_to(ROOT / name)
-    for paper in sorted(ROOT.glob("experiments/*/paper.yaml")):
+    for paper in sorted(ROOT.glob("experiments/studies/*/paper.yaml")):
         name, committed = paper.parent.name, paper.parent / "results/lite.json"
         if name in OTHER_PROGRAM or not committed.exists():
             continue
         words = [str(word) for word in yaml.safe_load(paper.read_text())["lite"]["words"]]
-        run("sweep", "plan", f"experiments/{name}/sweep.yaml", *words, "store=store", "--out", name, cwd=folder)
+        run("sweep", "plan", f"experiments/studies/{name}/sweep.yaml", *words, "store=store", "--out", name, cwd=folder)
         asked, known = questions(pathlib.Path(folder) / name / "plan.json"), questions(committed)
         same = sum(known.get(key) == trial for key, trial in asked.items())
         print(f"{name}: {same} of {len(asked)} trials are those of the committed plan")

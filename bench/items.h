@@ -57,8 +57,7 @@ struct ItemInfo {
   std::string what;  ///< for tables
   std::string per;   ///< what one of `examples` is
   int examples;      ///< per repetition
-  double gflop;  ///< of one example by the plain algorithm (docs/notes/performance_log.md); 0: not
-                 ///< counted
+  double gflop;      ///< of one example by the plain algorithm (work.h); 0: not counted
   MakeItem make;
   /// Models whose weights may change its speed: the item also exists with trained weights if there
   /// are any of one of them.

@@ -164,6 +164,7 @@ RetargetOptions one_choice() {
   RetargetOptions out;
   out.samples = 1;
   out.any_size = false;
+  out.any_way_up = false;
   return out;
 }
 
@@ -187,16 +188,18 @@ class FrameOnline : public Item {
   /// Vertices of the third frame relative to the pelvis.
   std::vector<double> check() override {
     for (int64_t i = 0; i < 3; ++i) push(i);
-    Points p = answer_[0].vertices;
-    for (Point& x : p) x -= answer_[0].joints->front().cast<float>();
+    Points p = answer_.vertices;
+    for (Point& x : p) x -= answer_.joints->front().cast<float>();
     return summary(tensor_of(p));
   }
 
  private:
-  void push(int64_t frame) { answer_ = retargeter_.push(clouds_[frame], "bench"); }
+  void push(int64_t frame) {
+    retargeter_.push(clouds_[frame], "bench", [this](const RetargetedFrame& f) { answer_ = f; });
+  }
   Retargeter retargeter_;
   std::vector<Points> clouds_;
-  std::span<const RetargetedFrame> answer_;
+  RetargetedFrame answer_;
   Frames frames_{1};
 };
 

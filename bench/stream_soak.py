@@ -125,7 +125,7 @@ def main():
     port, vmc = free_port(socket.SOCK_STREAM), free_port(socket.SOCK_DGRAM)
     receiver, sender = Receiver(vmc), Sender(port, clouds)
     receiver.start()
-    command = [a.program, "stream", "--target", a.target, "--in", "tcp://127.0.0.1:%d" % port, "--vmc", "127.0.0.1:%d" % vmc, "--json"]
+    command = [a.program, "stream", "--target", a.target, "--source", "tcp://127.0.0.1:%d" % port, "--vmc", "127.0.0.1:%d" % vmc, "--json"]
     command += (["--weights", a.weights] if a.weights else []) + a.more
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     said = []

@@ -14,6 +14,7 @@ TOP = ("autograd", "nn", "datasets", "train", "infer", "experiments", "python")
 BASE, TENSOR = "autograd/base", "autograd/tensor"
 ENGINE = [BASE, TENSOR, "autograd/kernels", "autograd/tape", "autograd/ops"]
 NN = ["nn", "nn/config", "nn/geometry", "nn/layers", "nn/losses", "nn/metrics", "nn/models", "nn/weights"]
+PRODUCT = ENGINE + NN + ["datasets/*", "train/*", "infer/*"]
 
 # What a folder may include besides itself. A name covers that folder only, "name/*" all below it.
 MAY_USE = {
@@ -39,10 +40,13 @@ MAY_USE = {
     "train/stages": ENGINE + NN + ["train", "train/artifacts", "datasets/*"],
     "train/training": ENGINE + NN + ["train", "train/artifacts", "train/stages", "datasets/*"],
     "train/*": ENGINE + NN + ["train", "train/optim", "train/mpi"],
-    "experiments/cli": ENGINE + NN + ["autograd/gradcheck", "datasets/*", "train/*", "infer/*", "experiments/*"],
-    "experiments/*": ENGINE + NN + ["datasets/*", "train/*", "infer/*", "experiments", "experiments/sweep",
-                                    "experiments/report", "experiments/observers"],
-    "python": ENGINE + NN + ["autograd/gradcheck", "datasets/*", "train/*", "infer/*", "experiments", "experiments/cli"],
+    "experiments/cli": PRODUCT + ["autograd/gradcheck", "experiments/*"],
+    "experiments/reproduce": PRODUCT + ["experiments", "experiments/evaluation", "experiments/pictures", "experiments/sweep"],
+    "experiments/sweep": PRODUCT + ["experiments", "experiments/evaluation", "experiments/observers", "experiments/report"],
+    "experiments/report": PRODUCT + ["experiments", "experiments/evaluation", "experiments/pictures", "experiments/sweep"],
+    "experiments/*": PRODUCT + ["experiments"],
+    "python": PRODUCT + ["autograd/gradcheck", "experiments", "experiments/adapt", "experiments/cli",
+                         "experiments/evaluation", "experiments/pictures"],
 }
 
 # Single files that may reach further: memory and conversions come from the backend.
@@ -56,20 +60,21 @@ ONLY_IN = {
     "spdlog/": ["autograd/base/log.cpp"],
     "sanitizer/": ["autograd/cpu/pool.cpp"],
     "hdf5.h": ["datasets/hdf5/"],
-    "yaml-cpp/": ["nn/config/config_yaml.cpp", "nn/weights/", "datasets/importers/profiles.cpp"],
+    "yaml-cpp/": ["nn/config/config_yaml.cpp", "nn/weights/", "datasets/importers/rigs/profiles.cpp"],
     "CLI/": ["experiments/cli/command_options.cpp", "experiments/cli/program.cpp"],
     "nanoflann.hpp": ["nn/metrics/", "datasets/doctor/", "infer/registration/"],
     "nlohmann/": ["nn/weights/", "datasets/readers/", "datasets/benchmark/manifest.cpp", "datasets/characters/",
-                  "datasets/importers/makehuman_pack.cpp", "datasets/fetch/fetch_cmu.cpp", "train/", "infer/",
+                  "datasets/doctor/mended_file.cpp",
+                  "datasets/importers/bodies/makehuman_pack.cpp", "datasets/fetch/fetch_cmu.cpp", "train/", "infer/",
                   "experiments/"],
     "mpi.h": ["train/mpi/"],
-    "assimp/": ["datasets/readers/assimp/"],
+    "assimp/": ["datasets/readers/fbx/assimp/"],
     "openssl/": ["datasets/readers/sha256.cpp"],
     "stb/": ["infer/render/"],
     "webp/": ["infer/render/texture.cpp", "infer/render/webp.cpp"],
     "gif_lib.h": ["infer/render/gif.cpp"],
     "lzma.h": ["datasets/readers/"],
-    "zip.h": ["datasets/readers/zip.cpp"],
+    "zip.h": ["datasets/readers/arrays/zip.cpp"],
     "zlib.h": ["datasets/readers/", "datasets/fetch/"],
     "curl/": ["datasets/fetch/download.cpp"],
     "lo/": ["infer/live/vmc.cpp"],

@@ -79,7 +79,7 @@ class Plan {
     const std::string split = file.text(object, "split").value_or("");
     if (!is_split(split))
       throw InputError(file.path() + ":" + object, "has the split '" + split.substr(0, 60) + "'",
-                       "import it again with --split train, validation or test");
+                       "import it again with {split} train, validation or test");
     return split;
   }
 
@@ -93,7 +93,7 @@ class Plan {
       throw InputError(path,
                        "subject '" + subject + "' is in the split '" + split + "' here and in '" +
                            first + "' before",
-                       "import one of them again with another --subject or --split");
+                       "import one of them again with another {subject} or {split}");
   }
 
   void refuse(const std::vector<std::string>& clashes, const std::string& what) const {
@@ -102,7 +102,7 @@ class Plan {
     if (clashes.size() > 1) named += " (and " + std::to_string(clashes.size() - 1) + " more)";
     throw InputError("", "two " + what + " have the same id: " + named,
                      prefix_ ? "rename one of the files, whose names are the prefixes"
-                             : "add --prefix to put the files' names before the ids");
+                             : "add {prefix} to put the files' names before the ids");
   }
 
   bool prefix_;

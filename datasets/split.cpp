@@ -26,7 +26,7 @@ void check_shares(const std::array<double, 3>& shares) {
   bool good = true;
   for (const double share : shares) sum += share, good = good && share >= 0;
   if (!good || std::abs(sum - 1) > 1e-6)
-    throw InputError("", "--shares are no parts of a whole",
+    throw InputError("", "{shares} are no parts of a whole",
                      "give three numbers that add up to 1, such as 0.8,0.1,0.1");
 }
 
@@ -146,7 +146,7 @@ SplitSummary split_data(const std::string& path, const std::string& out,
       std::count_if(options.shares.begin(), options.shares.end(), [](double x) { return x > 0; }));
   need_enough(path, members.subjects, options.by_clip ? "clips" : "subjects", wanted,
               options.by_clip ? "import more, or give a share of 0"
-                              : "import more people, or deal clips with --by clip (the test then "
+                              : "import more people, or deal clips with {by} clip (the test then "
                                 "meets people that training has seen)");
   const Guests guests = options.bodies.empty() ? Guests() : guests_from(options);
   for (const Body& guest : guests.bodies)
@@ -155,7 +155,7 @@ SplitSummary split_data(const std::string& path, const std::string& out,
                        "rename one of them");
   if (!members.bodies.empty() && guests.bodies.empty() && members.bodies.size() < wanted)
     log_warning(path + " holds " + std::to_string(members.bodies.size()) +
-                " bodies, too few for every split; add others with --bodies");
+                " bodies, too few for every split; add others with {bodies}");
   const RngKey key = RngKey{options.seed, 0}.fold("data.split");
   const Places subjects = deal(members.subjects, options.shares, key.fold("subjects"), {});
   Places own;  // bodies of subjects

@@ -2,7 +2,7 @@
 """Turns a PyTorch checkpoint (a pickle) into a safetensors file that restage can import.
 
     python3 docs/convert_pytorch.py model.pth model.safetensors [--key state_dict]
-    restage weights import --from model.safetensors --model skeleton/point_transformer \
+    restage weights import --source model.safetensors --model skeleton/point_transformer \
         [--map names.yaml] --out weights.safetensors
 
 restage itself never reads pickles, since reading one may run code that is hidden in it. This script

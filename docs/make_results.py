@@ -11,7 +11,6 @@ README.md's table is what stands between the lines <!-- results --> and <!-- /re
 
 import json
 import math
-import random
 import re
 import sys
 import textwrap
@@ -19,7 +18,6 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGE, README = ROOT / "docs/results.md", ROOT / "README.md"
-RESAMPLES = 10_000
 
 # ---- what is committed ---------------------------------------------------------------------------
 
@@ -46,7 +44,7 @@ class Trial:
 
 
 def trials(folder, pattern="trials/*/result.json"):
-    found = [Trial(path) for path in sorted((ROOT / "experiments" / folder).glob(pattern))]
+    found = [Trial(path) for path in sorted((ROOT / "experiments/studies" / folder).glob(pattern))]
     by_case = {}
     for trial in found:
         by_case.setdefault(trial.case, []).append(trial)
@@ -103,17 +101,41 @@ def table(head, rows):
 
 # ---- differences ---------------------------------------------------------------------------------
 
-_draws = {}
+def student(share, freedom):
+    """The t with P(|T| < t) = share (experiments/sweep/statistics.cpp)."""
+    def inside(t):
+        angle = math.atan(t / math.sqrt(freedom))
+        sine, cosine, odd = math.sin(angle), math.cos(angle), freedom % 2
+        term = cosine if odd else 1.0
+        total = 0.0 if freedom == 1 else term
+        for k in range(3 if odd else 2, freedom, 2):
+            term *= cosine * cosine * (k - 1) / k
+            total += term
+        return (angle + sine * total) * 2 / math.pi if odd else sine * total
+    low, high = 0.0, 1e6
+    for _ in range(100):
+        middle = (low + high) / 2
+        low, high = (middle, high) if inside(middle) < share else (low, middle)
+    return high
 
 
-def draws(trial_count, sequence_count):
-    """How experiments/sweep/statistics.h draws: trials, and once for all of them sequences, with replacement."""
-    key = trial_count, sequence_count
-    if key not in _draws:
-        chance = random.Random(0).random
-        _draws[key] = [(tuple(sorted(int(chance() * trial_count) for _ in range(trial_count))),
-                        [int(chance() * sequence_count) for _ in range(sequence_count)]) for _ in range(RESAMPLES)]
-    return _draws[key]
+def spread(values):
+    middle = mean(values)
+    return sum((v - middle) ** 2 for v in values) / (len(values) - 1)
+
+
+def half_width(columns):
+    """Of the 95 % interval: the rule of experiments/sweep/statistics.h. columns[trial][sequence]."""
+    n, size = len(columns), len(columns[0])
+    rows, sequences = [mean(c) for c in columns], [mean(v) for v in zip(*columns)]
+    if n == 1:
+        return student(0.95, size - 1) * math.sqrt(spread(sequences) / size)
+    middle = mean(rows)
+    left = sum((columns[k][s] - rows[k] - sequences[s] + middle) ** 2 for k in range(n) for s in range(size))
+    left /= (n - 1) * (size - 1)
+    parts = ((max(0, size * spread(rows) - left), n - 1), (max(0, n * spread(sequences) - left), size - 1),
+             (left, (n - 1) * (size - 1)))
+    return math.sqrt(sum(student(0.95, freedom) ** 2 * part for part, freedom in parts) / (n * size))
 
 
 def difference(row, other, kind, metric):
@@ -123,16 +145,9 @@ def difference(row, other, kind, metric):
         assert a.seed == b.seed
         mine, theirs = a.sequences(kind, metric, row.reference), b.sequences(kind, metric, other.reference)
         columns.append([mine[name] - theirs[name] for name in sorted(mine)])
-    n, size, mixed, means = len(columns), len(columns[0]), {}, []
-    for chosen, sequences in draws(n, size):
-        if chosen not in mixed:
-            mixed[chosen] = [sum(columns[k][s] for k in chosen) / n for s in range(size)]
-        values = mixed[chosen]
-        means.append(sum(values[s] for s in sequences) / size)
-    means.sort()
-    quantile = lambda q: means[int(q * (RESAMPLES - 1))]
-    per_sequence = [sum(c[s] for c in columns) / n for s in range(size)]
-    return mean(per_sequence), quantile(0.025), quantile(0.975), sum(v < 0 for v in per_sequence), size
+    per_sequence = [mean(values) for values in zip(*columns)]
+    middle, half = mean(per_sequence), half_width(columns)
+    return middle, middle - half, middle + half, sum(v < 0 for v in per_sequence), len(per_sequence)
 
 
 def said(row, other, kind, metric):
@@ -282,7 +297,7 @@ TEMPLATE = """# Results
 
 Errors on people and motions that no training saw: names in [metrics](metrics.md), sets and rows in
 [benchmark](benchmark.md). Lengths are in mm, Acc in mm per frame², foot slide in mm per frame. Less is better. In
-brackets: sequences. Older figures: [log](notes/results_log.md).
+brackets: sequences.
 
 ## At a glance
 
@@ -291,8 +306,7 @@ PA-MPVD. "Source unchanged" hands on the source's true skeleton.
 
 {glance}
 
-* Seeds share two of the networks' parts. So the true spread is larger
-  ([each seed](notes/results_log.md#seeds-calm-and-fitting-as-the-page-had-them)). Seed 1 is shipped.
+* Seeds share two of the networks' parts. So the true spread is larger. Seed 1 is shipped.
 * **The tables are of sweeps, which do not [hold bones](real_scans.md#one-person-is-one-skeleton) and do not [keep the
   names of limbs](real_scans.md#limbs-that-cross-keep-their-names).** `retarget` does both. The
   effect of held bones is [below](#four-kinds-of-cloud-pa-mpjpe--mpjpe--pa-mpvd--acc).
@@ -316,7 +330,7 @@ late](#two-frames-late), {lite_count} of lite, one of the others. "Is told": wha
 
 * A rule makes the truth. The closed form follows nearly the same rule with true joints: its joints are near the best.
 * Alignment removes place, turn and size, so "source unchanged" looks good in PA-MPJPE. MPJPE shows the difference.
-* "Lite" is of an earlier program ([surface and calm](notes/results_log.md#rows-and-tables-that-the-page-had)).
+* "Lite" is of an earlier program.
 
 {joints}.
 
@@ -355,7 +369,7 @@ comparison is seed 1's, with 95 % intervals:
 
 {late_differences}
 
-Five frames are [no better than two](notes/results_log.md#rows-and-tables-that-the-page-had).
+Five frames are [no better than two](decisions.md#motion).
 
 ## Sure frames are better
 
@@ -368,9 +382,9 @@ count alike, in the tables above all sequences, so 100 % differs a little.
 
 * [Switches of the motion network](reproduction/ours.md), [other systems](systems.md#results),
   [speed](performance.md), [the papers' tables](reproduction.md),
-  [fine-tuning](notes/results_log.md#11-a-training-day).
+  [fine-tuning](decisions.md#extractor).
 
-`restage sweep table experiments/shipped` shows intervals. `sweep.yaml` there says how to run the sweep.
+`restage sweep table experiments/studies/shipped` shows intervals. `sweep.yaml` there says how to run the sweep.
 """
 
 

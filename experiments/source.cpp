@@ -2,21 +2,12 @@
 
 #include <algorithm>
 
-#include "datasets/importers/axis.h"
 #include "datasets/readers/errors.h"
-#include "datasets/readers/gltf.h"
-#include "nn/geometry/strays.h"
+#include "datasets/readers/gltf/gltf.h"
 #include "nn/models/extraction.h"
 
 namespace restage {
 namespace {
-
-Eigen::Matrix3f turn_of(const std::string& up) {
-  const Axis axis = parse_axis(up, "--source-up");
-  if (axis == Axis::automatic)
-    throw InputError("", "--source-up 'auto' is not known here", "give x, -x, y, -y, z or -z");
-  return upright(axis).cast<float>();
-}
 
 void check(const SourceRecord& how) {
   if (how.fps && !(*how.fps >= 1 && *how.fps <= 1000))
@@ -28,25 +19,12 @@ void check(const SourceRecord& how) {
 
 }  // namespace
 
-ToOurs::ToOurs(double scale, const std::string& up)
-    : scale_(static_cast<float>(scale)), turn_(turn_of(up)) {
-  if (!(scale >= kLeastScale && scale <= kMostScale))
-    throw InputError("", "--scale is out of range", "give metres per unit, 1e-9 to 1e6");
-}
-
-void ToOurs::operator()(Points& points) const {
-  const bool upright = turn_.isIdentity();
-  for (Point& p : points) {
-    if (!upright) p = turn_ * p;
-    p *= scale_;
-  }
-}
-
 Source::Source(const SourceRecord& how, uint64_t max_memory)
     : how_(how), to_ours_(how.scale, how.up) {
   check(how);
   frames_ =
       open_frames(how.path, {.clip = how.clip, .max_memory = max_memory, .sequence = how.sequence});
+  check_one_sequence(how.path, frames_->sequences(), how.sequence);
   if (!how_.fps) how_.fps = frames_->fps();
 }
 
@@ -69,17 +47,13 @@ std::optional<SourceCloud> Source::next() {
     return_to_place();
     return out;
   }
-  if (out.frame.number >= 0) numbers_.push_back(out.frame.number);
   out.fault = out.frame.fault;
   if (!out.fault && out.frame.points.empty())
     out.fault = InputError(out.frame.source, "holds no points", "leave the frame out");
-  to_ours_(out.frame.points);
-  if (out.frame.faces.empty()) {
-    Points kept;
-    const size_t strays = leave_out_strays(out.frame.points, &kept);
-    if (strays > 0) out.frame.points = std::move(kept);
-    out.frame.left_out += strays;
-  }
+  if (out.frame.faces.empty())
+    out.frame.left_out += to_ours_.clean(out.frame.points);
+  else
+    to_ours_(out.frame.points);
   return out;
 }
 
@@ -90,21 +64,20 @@ void Source::skip(int64_t frames) {
 
 void Source::rewind() {
   at_ = 0;
-  numbers_.clear();
   broken_.reset();
   frames_->rewind();
 }
 
 std::vector<std::string> Source::remarks() const {
   std::vector<std::string> out = frames_->remarks();
-  if (std::ssize(numbers_) != frames_->frames() || numbers_.size() < 2) return out;
+  const std::vector<int64_t> numbers = frames_->numbers();
+  if (numbers.size() < 2) return out;
   int64_t step = INT64_MAX, missing = 0;
-  for (size_t i = 1; i < numbers_.size(); ++i) step = std::min(step, numbers_[i] - numbers_[i - 1]);
+  for (size_t i = 1; i < numbers.size(); ++i) step = std::min(step, numbers[i] - numbers[i - 1]);
   if (step < 1) return out;
-  for (size_t i = 1; i < numbers_.size(); ++i)
-    missing += (numbers_[i] - numbers_[i - 1]) / step - 1;
+  for (size_t i = 1; i < numbers.size(); ++i) missing += (numbers[i] - numbers[i - 1]) / step - 1;
   if (missing > 0)
-    out.push_back(cat(missing, missing == 1 ? " number is" : " numbers are",
+    out.push_back(cat(counted(missing, "number is", "numbers are"),
                       " missing in the names of the frames, which are played without a pause; "
                       "'restage doctor --fix OUT' puts frames without points there"));
   return out;
@@ -120,7 +93,29 @@ void Source::return_to_place() {
   }
 }
 
+void check_one_sequence(const std::string& path, int64_t sequences,
+                        const std::optional<int64_t>& chosen) {
+  if (!chosen && sequences > 1)
+    throw InputError(path, cat("holds ", sequences, " sequences"),
+                     "choose one with --sequence N, from 0");
+}
+
 SourceFrame frame_of(const SourceRecord& how) { return {how.scale, how.up, how.up_known}; }
+
+/// Some clouds, evenly from first to last.
+static std::vector<Points> clouds_of_take(Source& source) {
+  constexpr int64_t kClouds = 40;
+  const int64_t step = std::max<int64_t>(1, source.frames() / kClouds);
+  std::vector<Points> out;
+  for (int64_t at = 0; at < source.frames(); at += step) {
+    auto cloud = source.next();
+    if (!cloud) break;
+    if (!cloud->fault) out.push_back(std::move(cloud->frame.points));
+    source.skip(step - 1);
+  }
+  source.rewind();
+  return out;
+}
 
 void check_first_frames(Source& source) {
   std::vector<Mesh> first;
@@ -132,7 +127,8 @@ void check_first_frames(Source& source) {
     first.push_back({std::move(cloud->frame.points), std::move(cloud->frame.faces)});
   }
   source.rewind();
-  check_source(first, source.record().path, frame_of(source.record()));
+  check_source(first, source.record().path, frame_of(source.record()),
+               [&] { return clouds_of_take(source); });
 }
 
 }  // namespace restage

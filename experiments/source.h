@@ -5,8 +5,8 @@
 #include <optional>
 
 #include "autograd/base/error.h"
-#include "datasets/doctor/examine.h"
-#include "datasets/readers/frame_folder.h"
+#include "datasets/doctor/cloud_door.h"
+#include "datasets/readers/frames/frame_folder.h"
 #include "datasets/schema.h"
 
 namespace restage {
@@ -17,22 +17,10 @@ struct SourceCloud {
   std::optional<InputError> fault;  ///< names the frame's file
 };
 
-/// From a source's units and axes to metres, y up.
-class ToOurs {
- public:
-  /// InputError naming --scale or --source-up: out of range, no axis.
-  ToOurs(double scale, const std::string& up);
-  void operator()(Points& points) const;
-
- private:
-  float scale_;
-  Eigen::Matrix3f turn_;
-};
-
 class Source {
  public:
-  /// InputError: there is nothing to read; a setting that is out of range, by the name of its
-  /// option (--scale, --source-up, --fps).
+  /// InputError: there is nothing to read; check_one_sequence(); a setting that is out of range, by
+  /// the name of its option (--scale, --source-up, --fps).
   explicit Source(const SourceRecord& how, uint64_t max_memory = kMaxMemory);
   /// Of frames that somebody has at hand; `how.path` is what they are called.
   Source(const SourceRecord& how, std::unique_ptr<FrameSource> frames);
@@ -45,7 +33,6 @@ class Source {
   void rewind();
 
   int64_t frames() const { return frames_->frames(); }
-  int64_t sequences() const { return frames_->sequences(); }
   double fps() const { return *how_.fps; }
   /// What the user should know of the whole, such as files that were left out.
   std::vector<std::string> remarks() const;
@@ -59,9 +46,13 @@ class Source {
   ToOurs to_ours_;
   std::unique_ptr<FrameSource> frames_;
   int64_t at_ = 0;                    // frames given or skipped
-  std::vector<int64_t> numbers_;      // of the frames that were given, if all have one
   std::optional<InputError> broken_;  // nothing behind this place can be read
 };
+
+/// InputError where a file holds several sequences and none was chosen (--sequence): nothing is
+/// done with all of them as if they were one, and the first is not taken silently.
+void check_one_sequence(const std::string& path, int64_t sequences,
+                        const std::optional<int64_t>& chosen);
 
 /// How the source is read, for the doctor.
 SourceFrame frame_of(const SourceRecord& how);

@@ -29,17 +29,6 @@ std::string on_one_line(std::string text) {
   return valid_utf8(text);
 }
 
-std::string cause_of(const InputError& fault) {
-  const std::string text = fault.what();
-  return text.substr(0, text.rfind("; "));
-}
-
-std::string mend_of(const InputError& fault) {
-  const std::string text = fault.what();
-  const size_t end = text.rfind("; ");
-  return end == std::string::npos ? "" : text.substr(end + 2) + "; ";
-}
-
 std::string shell_word(const std::string& text) {
   std::string out = "'";
   for (const char c : text) out += c == '\'' ? std::string("'\\''") : std::string(1, c);
@@ -55,10 +44,6 @@ std::string error_line(const std::string& text) {
   while (continues_character(line[head])) --head;
   while (tail < line.size() && continues_character(line[tail])) ++tail;
   return line.substr(0, head) + "..." + line.substr(tail);
-}
-
-std::string counted(int64_t n, const std::string& what) {
-  return std::to_string(n) + " " + what + (n == 1 ? "" : "s");
 }
 
 std::string markdown_table(const std::vector<std::vector<std::string>>& rows) {

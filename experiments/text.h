@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "autograd/base/error.h"
+#include "autograd/base/words.h"
 
 namespace restage {
 
@@ -17,11 +17,6 @@ std::string on_one_line(std::string text);
 std::string shell_word(const std::string& text);
 /// `restage: <text>` as exactly one line of under 400 characters.
 std::string error_line(const std::string& text);
-/// What is wrong, without how to mend it; and how to mend it, with "; " behind it, or nothing.
-std::string cause_of(const InputError& fault);
-std::string mend_of(const InputError& fault);
-/// "1 frame", "3 frames".
-std::string counted(int64_t n, const std::string& what);
 /// A Markdown table with columns of equal width; the first row is the heading, the first column is
 /// aligned left, the others right.
 std::string markdown_table(const std::vector<std::vector<std::string>>& rows);

@@ -1,14 +1,12 @@
 #include "infer/h4d.h"
 
 #include <algorithm>
-#include <chrono>
 
 #include "autograd/base/error.h"
 #include "autograd/base/format.h"
 #include "autograd/ops/layout.h"
 #include "infer/cloud_input.h"
 #include "infer/registration/nearest_detail.h"
-#include "nn/geometry/skinning.h"
 #include "nn/models/extraction.h"
 
 namespace restage {
@@ -39,14 +37,6 @@ Eigen::VectorXd area_shares(const Matrix& vertices, const std::vector<Triangle>&
   if (!(sum > 0))
     return Eigen::VectorXd::Constant(out.size(), 1.0 / static_cast<double>(out.size()));
   return out / sum;
-}
-
-Pose between(const Pose& a, const Pose& b, double t) {
-  Pose out;
-  for (size_t j = 0; j < kJoints; ++j)
-    out.local[j] = Quat(a.local[j]).slerp(t, Quat(b.local[j])).toRotationMatrix();
-  out.root = (1 - t) * a.root + t * b.root;
-  return out;
 }
 
 double foot_height(const Joints& rest) {
@@ -122,7 +112,7 @@ H4dSystem::H4dSystem(const Bundle& weights, const std::string& weights_name, Mes
   body_.rest = std::move(target);
   skin(target_shape(options.seed));
   if (rest) body_.joints = *rest;
-  rig_.emplace(SystemRig{body_.joints, body_.weights});
+  system_rig_.emplace(SystemRig{body_.joints, body_.weights});
   restart();
 }
 
@@ -176,10 +166,17 @@ void H4dSystem::skin(const Eigen::VectorXd& shape) {
   }
 }
 
-std::span<const RetargetedFrame> H4dSystem::push(const Points& cloud, const std::string& source) {
+void H4dSystem::answer(const Points& cloud, const std::string& source, const Show& show) {
   require_body(cloud, source);
-  const auto begun = std::chrono::steady_clock::now();
-  frames_.clear();
+  look(cloud);
+  const auto first = static_cast<int64_t>(frames_of_window_);
+  if (clouds_ >= first)
+    answer_window(clouds_ == first ? 0 : frames_of_window_ - 1, frames_of_window_, show);
+}
+
+/// Puts a cloud into the window, as the networks see it.
+void H4dSystem::look(const Points& cloud) {
+  const Stopwatch watch(&times_.deformation);
   EvenPoints points;
   points.arrange(cloud);
   Seen seen;
@@ -189,19 +186,27 @@ std::span<const RetargetedFrame> H4dSystem::push(const Points& cloud, const std:
   seen.features = features.reshape({1, 1, features.size(1)});
   seen.pose = model_->pose_encoder(ctx, shown).value;
   shapes_ += matrix_of(model_->id_encoder(ctx, shown).value, shapes_.size());
-  seen.missed = std::exchange(missed_, 0);
+  seen.missed = missed();
   window_.push_back(std::move(seen));
   if (window_.size() > frames_of_window_) window_.pop_front();
   ++clouds_;
-  const auto first = static_cast<int64_t>(frames_of_window_);
-  if (clouds_ >= first) answer(clouds_ == first ? 0 : frames_of_window_ - 1, frames_of_window_);
-  times_.deformation =
-      std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
-  return frames_;
 }
 
-/// Answers frames [from, to) of the window, which is full.
-void H4dSystem::answer(size_t from, size_t to) {
+/// Shows frames [from, to) of the window, which is full.
+void H4dSystem::answer_window(size_t from, size_t to, const Show& show) {
+  Tensor poses;
+  {
+    const Stopwatch watch(&times_.deformation);
+    poses = poses_of_window();
+  }
+  for (size_t k = from; k < to; ++k) {
+    frame_.pose = pose_of(poses.data<float>() + k * 3 * kJoints, window_[k].middle);
+    show_after_gap(window_[k].missed, frame_, show);
+  }
+}
+
+/// The rotation vectors of the source in all frames of the window; source_ gets its shape.
+Tensor H4dSystem::poses_of_window() {
   Context ctx;
   std::vector<Var> frames;
   for (const Seen& seen : window_) frames.emplace_back(seen.features);
@@ -209,15 +214,13 @@ void H4dSystem::answer(size_t from, size_t to) {
   for (size_t i = 1; i < frames.size(); ++i) features = concat({features, frames[i]}, 1);
   H4d::Codes codes{{}, Var(window_.front().pose), {}, {}};
   model_->read_motion(ctx, features, &codes);
-  const Tensor poses = model_->poses(ctx, codes, basis_).value.cpu();
   source_.take(shapes_ / static_cast<double>(clouds_));
-  for (size_t k = from; k < to; ++k)
-    show(place(poses.data<float>() + k * 3 * kJoints, window_[k].middle), window_[k].missed);
+  return model_->poses(ctx, codes, basis_).value.cpu();
 }
 
 /// The target in the pose that these rotation vectors say, where the source stands whose cloud has
 /// this middle.
-Pose H4dSystem::place(const float* numbers, const Vec3& middle) {
+Pose H4dSystem::pose_of(const float* numbers, const Vec3& middle) const {
   Pose out;
   for (size_t j = 0; j < kJoints; ++j) {
     const Vec3 turn = Eigen::Map<const Point>(numbers + 3 * j).cast<double>();
@@ -231,49 +234,19 @@ Pose H4dSystem::place(const float* numbers, const Vec3& middle) {
   return out;
 }
 
-/// Adds a frame, and before it those that were missed.
-void H4dSystem::show(const Pose& pose, int64_t missed) {
-  for (int64_t k = 1; k <= missed; ++k) {
-    const double share = static_cast<double>(k) / static_cast<double>(missed + 1);
-    add(shown_ ? between(*shown_, pose, share) : pose, true);
-  }
-  add(pose, false);
-  shown_ = pose;
-}
-
-void H4dSystem::add(const Pose& pose, bool filled) {
-  RetargetedFrame& out = frames_.emplace_back();
-  out.pose = pose;
-  out.filled = filled;
-  const PosedSkeleton posed = forward_kinematics(body_.joints, pose);
-  out.joints = posed.joints;
-  for (size_t i = 0; i < body_.rest.vertices.size(); ++i)
-    out.vertices.push_back(blend(body_.rest.vertices[i].cast<double>(),
-                                 body_.weights.data() + i * kJoints, body_.joints, posed)
-                               .cast<float>());
-  const auto finite = [](const auto& x) { return x.allFinite(); };
-  if (!std::all_of(posed.joints.begin(), posed.joints.end(), finite) ||
-      !std::all_of(out.vertices.begin(), out.vertices.end(), finite))
-    throw InputError("", "a frame of the result is not finite",
-                     "check that source and target are in metres");
-}
-
-std::span<const RetargetedFrame> H4dSystem::finish() {
-  frames_.clear();
+void H4dSystem::answer_rest(const Show& show) {
   const size_t clouds = window_.size();
-  if (clouds > 0 && clouds < frames_of_window_) {
+  if (clouds < frames_of_window_) {
     while (window_.size() < frames_of_window_) window_.push_back(window_.back());
-    answer(0, clouds);
+    answer_window(0, clouds, show);
   }
-  for (; shown_ && missed_ > 0; --missed_) add(*shown_, true);
-  restart();
-  return frames_;
+  EachCloud::answer_rest(show);
 }
 
-void H4dSystem::restart() {
+void H4dSystem::forget() {
+  EachCloud::forget();
   window_.clear();
-  shown_.reset();
-  clouds_ = missed_ = 0;
+  clouds_ = 0;
   shapes_ = Eigen::VectorXd::Zero(model_->config.shape);
 }
 

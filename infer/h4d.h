@@ -7,8 +7,8 @@
 #include <memory>
 #include <optional>
 
+#include "infer/each_cloud.h"
 #include "infer/retargeter.h"
-#include "infer/system.h"
 #include "nn/models/even_points.h"
 #include "nn/models/h4d.h"
 #include "nn/weights/bundle.h"
@@ -51,7 +51,7 @@ class ShapedSkeleton {
 ///
 /// The target keeps its own vertices. Each takes the skin weights of the nearest vertex of the
 /// target's reconstructed body, and is posed from its own rest place.
-class H4dSystem final : public System {
+class H4dSystem final : public EachCloud {
  public:
   /// `weights_name` and `where` name weights and target in errors. `rest`: the target's joints, if
   /// they are known; they take the place of the reconstructed ones. InputError: no network of this
@@ -60,19 +60,16 @@ class H4dSystem final : public System {
             const std::string& where, const std::optional<Joints>& rest,
             const RetargetOptions& options);
 
-  std::span<const RetargetedFrame> push(const Points& cloud, const std::string& source) override;
-  void miss() override { ++missed_; }
-  std::span<const RetargetedFrame> finish() override;
-  void restart() override;
   const Mesh& target() const override { return body_.rest; }
-  const SystemRig* rig() const override { return &*rig_; }
-  Points posed(const Pose& pose) const override { return linear_blend_skinning(body_, pose); }
   const Joints* target_joints() const override { return &body_.joints; }
   /// Poses are answered, joints are not looked for.
   const Joints* source_joints() const override { return nullptr; }
-  FrameTimes times() const override { return times_; }
 
  private:
+  void answer(const Points& cloud, const std::string& source, const Show& show) override;
+  void answer_rest(const Show& show) override;
+  void forget() override;
+  void place(RetargetedFrame& frame) const override { place_body(body_, frame); }
   /// A cloud as the networks saw it.
   struct Seen {
     Tensor features;  ///< [1, 1, c], on the network's device
@@ -83,23 +80,20 @@ class H4dSystem final : public System {
   Tensor centred(const EvenPoints& points, double offset, Vec3* middle) const;
   Eigen::VectorXd target_shape(uint64_t seed) const;
   void skin(const Eigen::VectorXd& shape);
-  void answer(size_t from, size_t to);
-  Pose place(const float* numbers, const Vec3& middle);
-  void show(const Pose& pose, int64_t missed);
-  void add(const Pose& pose, bool filled);
+  void look(const Points& cloud);
+  void answer_window(size_t from, size_t to, const Show& show);
+  Tensor poses_of_window();
+  Pose pose_of(const float* numbers, const Vec3& middle) const;
 
   std::shared_ptr<H4d> model_;
   MotionBasis basis_;
   size_t points_, frames_of_window_;
   Body body_;  ///< the target
-  std::optional<SystemRig> rig_;
   ShapedSkeleton source_;
   Eigen::VectorXd shapes_;  ///< sum over the source's clouds
-  int64_t clouds_ = 0, missed_ = 0;
+  int64_t clouds_ = 0;
   std::deque<Seen> window_;
-  std::optional<Pose> shown_;
-  FrameTimes times_;
-  std::vector<RetargetedFrame> frames_;  ///< of the last call
+  RetargetedFrame frame_;  ///< of the last cloud that was answered
 };
 
 }  // namespace restage

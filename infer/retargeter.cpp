@@ -1,7 +1,6 @@
 #include "infer/retargeter.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <string>
 
@@ -64,21 +63,6 @@ MotionInput input_of(const SeenJoints& seen, const Mat3& turn, const Vec3& moved
   return out;
 }
 
-/// Adds the time between its construction and its destruction to a sum, seconds.
-class Stopwatch {
- public:
-  explicit Stopwatch(double* seconds) : seconds_(seconds) {}
-  ~Stopwatch() {
-    *seconds_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
-  }
-  Stopwatch(const Stopwatch&) = delete;
-  Stopwatch& operator=(const Stopwatch&) = delete;
-
- private:
-  double* seconds_;
-  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
-};
-
 bool is_clear(const SeenJoints& seen) {
   return !seen.uncertainty || confidence(*seen.uncertainty) >= kClear;
 }
@@ -114,11 +98,12 @@ Retargeter::Retargeter(const Bundle& weights, const std::string& weights_name, M
     : models_(weights), target_(std::move(target)), options_(options) {
   auto& skeleton = models_.need_as<SkeletonModel>("skeleton", weights_name);
   const RngKey key = RngKey{options.seed, 0}.fold("target");
-  rest_ = extract_joints(skeleton, surface_points(target_, kTargetPoints, key.fold("surface")),
-                         where, key, kTargetSamples, kRestPoses, options.any_size);
+  rest_ = extract_joints(
+      skeleton, surface_points(target_, kTargetPoints, key.fold("surface")), where, key,
+      {.samples = kTargetSamples, .around = kRestPoses, .any_size = options.any_size});
   if (const std::string off = off_tpose(rest_); !off.empty() && !options.force)
     throw InputError(where, off + ", as these weights see it",
-                     "give the target in T-pose facing +z, y up, or add --force");
+                     "give the target in T-pose facing +z, y up, or add {force}");
   prepare(weights_name);
 }
 
@@ -131,14 +116,16 @@ Retargeter::Retargeter(const Bundle& weights, const std::string& weights_name, M
 void Retargeter::prepare(const std::string& weights_name) {
   if (!(options_.fps >= 1 && options_.fps <= 1000))
     throw InputError("", "the source's frames per second are out of range",
-                     "give --fps from 1 to 1000");
+                     "give {fps} from 1 to 1000");
   if (!(options_.anchor >= 0))
-    throw InputError("", "the anchor's time is out of range", "give --anchor 0 or more seconds");
+    throw InputError("", "the anchor's time is out of range", "give {anchor} 0 or more seconds");
   if (!(options_.min_confidence >= 0 && options_.min_confidence <= 1))
-    throw InputError("", "the least confidence is out of range", "give --min-confidence 0 to 1");
+    throw InputError("", "the least confidence is out of range", "give {min-confidence} 0 to 1");
   if (auto* skeleton = models_.find_as<SkeletonModel>("skeleton"))
-    extractor_.emplace(*skeleton, options_.samples, kAllAround, options_.keep_limbs,
-                       options_.any_size);
+    extractor_.emplace(*skeleton, LookOptions{.samples = options_.samples,
+                                              .keep_limbs = options_.keep_limbs,
+                                              .any_size = options_.any_size,
+                                              .any_way_up = options_.any_way_up});
   const std::string role =
       options_.late && models_.find(kLateMotion) != nullptr ? kLateMotion : "motion";
   const TrainedModel& motion = models_.need(role, weights_name);
@@ -157,12 +144,12 @@ void Retargeter::prepare(const std::string& weights_name) {
   rest_tensor_ = tensor_of(rest_, rest_[0]);
   if (models_.find("deformation.weights") != nullptr)
     surface_.emplace(models_, weights_name, target_, rest_, motion_device_);
-  if (surface_) rig_.emplace(SystemRig{rest_, surface_->weights()});
+  if (surface_) system_rig_.emplace(SystemRig{rest_, surface_->weights()});
 }
 
 bool Retargeter::frame_by_frame() const { return options_.fps == kFps && motion_->latency() == 0; }
 
-void Retargeter::restart() {
+void Retargeter::forget() {
   state_ = {};
   feet_ = {};
   bones_ = {};
@@ -171,153 +158,137 @@ void Retargeter::restart() {
   previous_.reset();
   back_before_.reset();
   received_.reset();
-  frame_ = grid_ = missed_ = answered_ = 0;
-  begun_ = 0;
+  grid_ = answered_ = begun_ = 0;
   clear_start_ = true;
   legs_a_ = 0;
 }
 
-std::span<const RetargetedFrame> Retargeter::push(const Points& cloud, const std::string& source) {
-  const RngKey key = RngKey{options_.seed, 0}.fold("frame").fold(static_cast<uint64_t>(frame_));
+void Retargeter::answer(const Points& cloud, const std::string& source, const Show& show) {
+  const RngKey key = RngKey{options_.seed, 0}.fold("frame").fold(static_cast<uint64_t>(frames()));
   SeenJoints seen;
-  double seconds = 0;
   {
-    const Stopwatch watch(&seconds);
+    const Stopwatch watch(&times_.extract);
     if (!extractor_)
       throw InputError(source, "cannot be read without a model for skeleton",
                        "give weights that have one");
     const bool remembers =
-        received_ && options_.fps / static_cast<double>(missed_ + 1) > kRemembering;
+        received_ && options_.fps / static_cast<double>(missed() + 1) > kRemembering;
     seen = (*extractor_)(cloud, source, key, remembers ? &*received_ : nullptr);
     if (!options_.force) check_not_lost(seen, source);
     if (!clear_start_ && is_clear(seen)) bones_ = {};  // B begins once more
     if (options_.steady_bones) seen.joints = bones_(seen.joints, seen.uncertainty);
   }
-  const auto out = push_joints(seen);
-  times_.extract = seconds;
-  return out;
+  answer_joints(seen, show);
 }
 
-bool is_lost(const SeenJoints& now, const SeenJoints& before) {
-  constexpr double kLost = 0.25;  // docs/notes/real_scans_log.md
-  return now.uncertainty && before.uncertainty && confidence(*now.uncertainty) < kLost &&
-         confidence(*before.uncertainty) >= kClear;
+std::string lost(const SeenJoints& now, const SeenJoints& before, double seconds) {
+  constexpr double kLost = 0.25;                  // docs/decisions.md, "Doctor and real scans"
+  constexpr double kTurned = 30, kTurning = 600;  // degrees, and degrees a second
+  if (!now.uncertainty || !before.uncertainty || confidence(*before.uncertainty) < kClear)
+    return "";
+  if (confidence(*now.uncertainty) < kLost)
+    return format("shows nobody who can be made out (confidence %.2f)",
+                  confidence(*now.uncertainty));
+  const double turned = trunk_turn(now.joints, before.joints) * 180 / M_PI;
+  if (turned < kTurned + kTurning * seconds) return "";
+  return format("shows a trunk that turned by %.0f degrees in %.2f s", turned, seconds);
 }
 
 /// A frame in which nobody can be made out, soon after one in which everything was clear, is a
 /// fault of the source (another unit, another axis up, another thing). B would be thrown about for
 /// it, and the memory of it would spoil the frames after it (RetargetOptions::lost_seconds).
 void Retargeter::check_not_lost(const SeenJoints& seen, const std::string& source) const {
-  if (!received_ || !is_lost(seen, *received_)) return;
-  if (static_cast<double>(missed_ + 1) / options_.fps > options_.lost_seconds + 1e-9) return;
-  throw UnusableCloud(source,
-                      format("shows nobody who can be made out (confidence %.2f), unlike the "
-                             "frames before",
-                             confidence(*seen.uncertainty)),
-                      "give all frames in one unit and with one axis up, leave this one out, or "
-                      "--force to take it as it is");
+  const double seconds = static_cast<double>(missed() + 1) / options_.fps;
+  if (!received_ || seconds > options_.lost_seconds + 1e-9) return;
+  if (const std::string fault = lost(seen, *received_, seconds); !fault.empty())
+    throw UnusableCloud(source, fault + ", unlike the frames before",
+                        "give all frames in one unit and with one axis up, leave this one out, or "
+                        "{force} to take it as it is");
 }
 
-void Retargeter::miss() {
-  ++frame_;
-  ++missed_;
+void Retargeter::push_joints(const SeenJoints& seen, const Show& show) {
+  take([&] { answer_joints(seen, show); });
 }
 
-std::span<const RetargetedFrame> Retargeter::push_joints(const SeenJoints& seen) {
+void Retargeter::answer_joints(const SeenJoints& seen, const Show& show) {
   last_source_ = seen.joints;
-  times_ = {};
-  ++frame_;
-  const size_t count = advance(seen, false);
+  advance(seen, frames(), false, show);
   received_ = seen;
-  missed_ = 0;
-  return {frames_.data(), count};
 }
 
-/// Answers all grid frames up to the moment of source frame frame_ - 1 and returns how many were
-/// answered. `seen`: A in that source frame. Between two source frames that were received, A's
-/// positions are interpolated. `ended`: the source ended with missed frames; `seen` is then A in
-/// the last frame that was received, and A stays so.
-size_t Retargeter::advance(const SeenJoints& seen, bool ended) {
-  const double now = static_cast<double>(frame_ - 1) / options_.fps;
-  const auto apart = static_cast<double>(missed_ + 1);  // source frames from received_ to `seen`
-  size_t count = 0;
+/// Answers all moments of the grid up to the moment of the source's frame `frame`. `seen`: A in
+/// that frame. Between two frames of the source that were received, A's positions are interpolated.
+/// `ended`: the source ended with missed frames; `seen` is then A in the last frame that was
+/// received, and A stays so.
+void Retargeter::advance(const SeenJoints& seen, int64_t frame, bool ended, const Show& show) {
+  const double now = static_cast<double>(frame) / options_.fps;
+  const auto apart = static_cast<double>(missed() + 1);  // source frames from received_ to `seen`
   while (static_cast<double>(grid_) / kFps <= now + 1e-9) {
     const double back =
         (now - static_cast<double>(grid_) / kFps) * options_.fps;  // in source frames
     const bool between = back > 1e-9 && !ended;
-    if (frames_.size() == count) frames_.emplace_back();
-    count +=
-        step(received_ && between ? blend(seen, *received_, std::min(back / apart, 1.0)) : seen,
-             missed_ > 0 && (between || ended), &frames_[count]);
+    step(received_ && between ? blend(seen, *received_, std::min(back / apart, 1.0)) : seen,
+         missed() > 0 && (between || ended), show);
   }
-  return count;
 }
 
-std::span<const RetargetedFrame> Retargeter::finish() {
-  size_t count = 0;
-  if (missed_ > 0 && received_) {
-    count = advance(*received_, true);
-    missed_ = 0;
-  }
-  if (grid_ == 0) return {};
+void Retargeter::answer_rest(const Show& show) {
+  if (missed() > 0) advance(*received_, frames() - 1, true, show);
   const SeenJoints last = asked_[static_cast<size_t>((grid_ - 1) % std::ssize(asked_))].seen;
-  for (const int64_t all = grid_; answered_ < all;) {
-    if (frames_.size() == count) frames_.emplace_back();
-    count += step(last, false, &frames_[count]);
-  }
-  restart();
-  return {frames_.data(), count};
+  for (const int64_t all = grid_; answered_ < all;) step(last, false, show);
 }
 
-bool Retargeter::step(const SeenJoints& now, bool filled, RetargetedFrame* out) {
+/// Tells the motion network of one moment of the grid, and shows the frame that the network
+/// answers, if there is one: the frame of this moment, or of an earlier one.
+void Retargeter::step(const SeenJoints& now, bool filled, const Show& show) {
   SeenJoints seen = now;
   {
     const Stopwatch watch(&times_.motion);
     const double heading = remove_heading_ ? heading_(now.joints) : 0;
-    const MotionOutput said = answer(now, turn_about_y(heading));
+    const MotionOutput said = ask(now, turn_about_y(heading));
     const int64_t room = std::ssize(asked_);
     asked_[static_cast<size_t>(grid_ % room)] = {now, turn_about_y(heading), filled};
-    if (++grid_ < room) return false;
+    if (++grid_ < room) return;
     const Asked& then = asked_[static_cast<size_t>(grid_ % room)];  // the oldest
     seen = then.seen;
-    out->filled = then.filled;
-    perform(said, seen.joints, then.turn, &out->pose);
+    frame_.filled = then.filled;
+    perform(said, seen.joints, then.turn, &frame_.pose);
   }
-  out->confidence.reset();
-  if (seen.uncertainty) out->confidence = out->filled ? 0 : confidence(*seen.uncertainty);
-  hold_doubtful(seen.joints, out);
-  const Stopwatch watch(&times_.deformation);
-  const PosedSkeleton posed = forward_kinematics(rest_, out->pose);
-  out->joints = posed.joints;
-  if (surface_) (*surface_)(out->pose, posed, &out->vertices);
-  const auto finite = [](const auto& x) { return x.allFinite(); };
-  if (!std::all_of(posed.joints.begin(), posed.joints.end(), finite) ||
-      !std::all_of(out->vertices.begin(), out->vertices.end(), finite))
-    throw InputError("", "frame " + std::to_string(answered_ - 1) + " of the result is not finite",
-                     "check that source and target are in metres");
-  return true;
+  frame_.confidence.reset();
+  if (seen.uncertainty) frame_.confidence = frame_.filled ? 0 : confidence(*seen.uncertainty);
+  hold_doubtful(seen.joints);
+  adjust(frame_);
+  hand_out(frame_, show);
+}
+
+void Retargeter::place(RetargetedFrame& frame) const {
+  const PosedSkeleton posed = forward_kinematics(rest_, frame.pose);
+  frame.joints = posed.joints;
+  if (surface_) (*surface_)(frame.pose, posed, &frame.vertices);
 }
 
 /// Lets B wait in a frame without confidence (RetargetOptions::min_confidence). `a`: A's joints in
-/// the frame `out`.
-void Retargeter::hold_doubtful(const Joints& a, RetargetedFrame* out) {
-  if (!out->confidence && options_.min_confidence > 0)
+/// that frame.
+void Retargeter::hold_doubtful(const Joints& a) {
+  if (!frame_.confidence && options_.min_confidence > 0)
     throw InputError("", "these weights do not say how sure they are of a frame",
-                     "leave --min-confidence out, or give weights whose extractor has sizes."
+                     "leave {min-confidence} out, or give weights whose extractor has sizes."
                      "uncertainty");
   if (options_.min_confidence == 0) return;
-  if (*out->confidence >= options_.min_confidence) {
-    out->pose = waiting_.go_on(out->pose);
+  if (*frame_.confidence >= options_.min_confidence) {
+    frame_.pose = waiting_.go_on(frame_.pose);
     return;
   }
-  Pose rest = out->pose;
+  Pose rest = frame_.pose;
   rest.local.fill(Mat3::Identity());
   rest.local[0] = turn_about_y(heading_angle(a));
-  out->pose = waiting_.wait(rest);
+  frame_.pose = waiting_.wait(rest);
 }
 
-/// B begins where A does, in proportion to its legs. If A could not be made out then, B begins once
-/// more in the first clear frame: half of somebody, or another thing, is no place to start from.
+/// Puts B where A begins, in proportion to the length of B's legs.
+/// B begins in the first frame of the sequence.
+/// If A could not be made out in that frame, B begins once more, in the first clear frame: half of
+/// somebody, or another thing, is no place to start from.
 void Retargeter::begin(const SeenJoints& seen) {
   const bool clear = is_clear(seen);
   if (previous_ && (clear_start_ || !clear)) return;
@@ -337,7 +308,7 @@ void Retargeter::begin(const SeenJoints& seen) {
 }
 
 /// The motion network's answer to A as `seen`. `turn`: A's heading.
-MotionOutput Retargeter::answer(const SeenJoints& seen, const Mat3& turn) {
+MotionOutput Retargeter::ask(const SeenJoints& seen, const Mat3& turn) {
   const Joints& a = seen.joints;
   const Mat3 back = turn.transpose();
   begin(seen);

@@ -4,7 +4,6 @@
 #pragma once
 
 #include <optional>
-#include <span>
 
 #include "infer/foot_lock.h"
 #include "infer/surface.h"
@@ -40,6 +39,8 @@ struct RetargetOptions {
   bool keep_limbs = true;
   /// People of any size are seen in an adult's (nn/models/extraction.h), targets too.
   bool any_size = true;
+  /// Who lies, leans or stands on the hands is seen upright (nn/models/extraction.h).
+  bool any_way_up = true;
   /// Use the motion network that looks ahead, if the weights hold one (kLateMotion): calmer and
   /// nearer, but every frame comes MotionModel::latency() frames later.
   bool late = false;
@@ -47,15 +48,15 @@ struct RetargetOptions {
   bool steady_bones = true;
 };
 
-/// Whether a frame shows nobody who can be made out, unlike a frame `before` in which all was
-/// clear.
-bool is_lost(const SeenJoints& now, const SeenJoints& before);
+/// What is wrong with a frame, `seconds` after a frame in which all was clear: nobody can be made
+/// out, or the trunk has turned as nobody turns. Empty: nothing.
+std::string lost(const SeenJoints& now, const SeenJoints& before, double seconds);
 
 /// Our chain of three networks: the extractor finds A's joints in a cloud, the motion network finds
 /// B's pose for them, the deformation network gives B's surface. Every network computes on the
 /// device on which its parameters lie (move_networks()); the deformation network on the motion
 /// network's.
-class Retargeter final : public System {
+class Retargeter : public System {
  public:
   /// `weights` must hold a model for `skeleton` and one for `motion`. Without `deformation.weights`
   /// frames have no vertices; without `deformation.offsets` vertices are skinned only.
@@ -69,21 +70,10 @@ class Retargeter final : public System {
   Retargeter(const Bundle& weights, const std::string& weights_name, Mesh target,
              const Joints& rest, const RetargetOptions& options);
 
-  /// At 30 fps each cloud gives one frame. At another rate a cloud gives the frames of the grid
-  /// between the moment of the cloud before and its own moment. A motion network that looks ahead
-  /// gives every frame MotionModel::latency() frames later. After a few frames, a call takes no new
-  /// memory.
-  std::span<const RetargetedFrame> push(const Points& cloud, const std::string& source) override;
-  void miss() override;
   /// As push(), for an A whose joints are known. `seen`: in the world, metres.
-  std::span<const RetargetedFrame> push_joints(const SeenJoints& seen);
-  /// To answer the last frames, a network that looks ahead is shown A standing still.
-  std::span<const RetargetedFrame> finish() override;
-  void restart() override;
+  void push_joints(const SeenJoints& seen, const Show& show);
 
   const Mesh& target() const override { return target_; }
-  const SystemRig* rig() const override { return rig_ ? &*rig_ : nullptr; }
-  Points posed(const Pose& pose) const override { return surface_ ? (*surface_)(pose) : Points(); }
   const Joints* target_joints() const override { return &rest_; }
   const Joints& rest() const { return rest_; }
   /// Whether every push() returns one frame, the frame of the pushed cloud's own moment.
@@ -91,18 +81,30 @@ class Retargeter final : public System {
   /// Null without a model for `deformation.weights`.
   const Surface* surface() const { return surface_ ? &*surface_ : nullptr; }
   const Joints* source_joints() const override { return &last_source_; }
-  FrameTimes times() const override { return times_; }
+
+ protected:
+  /// At 30 fps each cloud gives one frame. At another rate a cloud gives the frames of the grid
+  /// between the moment of the cloud before and its own moment. A motion network that looks ahead
+  /// gives every frame MotionModel::latency() frames later. After a few frames, a call takes no new
+  /// memory.
+  void answer(const Points& cloud, const std::string& source, const Show& show) override;
+  /// Changes the pose of a frame before the frame is placed and shown.
+  virtual void adjust(RetargetedFrame&) {}
 
  private:
+  /// To answer the last frames, a network that looks ahead is shown A standing still.
+  void answer_rest(const Show& show) override;
+  void forget() override;
+  void place(RetargetedFrame& frame) const override;
   void prepare(const std::string& weights_name);
   void check_not_lost(const SeenJoints& seen, const std::string& source) const;
-  size_t advance(const SeenJoints& seen, bool ended);
-  /// Answers one moment of the grid. False: the network has not answered yet, `out` is not set.
-  bool step(const SeenJoints& seen, bool filled, RetargetedFrame* out);
+  void answer_joints(const SeenJoints& seen, const Show& show);
+  void advance(const SeenJoints& seen, int64_t frame, bool ended, const Show& show);
+  void step(const SeenJoints& seen, bool filled, const Show& show);
   void begin(const SeenJoints& seen);
-  MotionOutput answer(const SeenJoints& seen, const Mat3& turn);
+  MotionOutput ask(const SeenJoints& seen, const Mat3& turn);
   void perform(const MotionOutput& answer, const Joints& a, const Mat3& turn, Pose* pose);
-  void hold_doubtful(const Joints& a, RetargetedFrame* out);
+  void hold_doubtful(const Joints& a);
   void sum_path(const Joints& a, const Vec3& velocity);
 
   Bundle models_;
@@ -113,7 +115,6 @@ class Retargeter final : public System {
   Device motion_device_;
   Joints rest_;
   std::optional<Surface> surface_;
-  std::optional<SystemRig> rig_;
   Tensor rest_tensor_;  // rest_, relative to its pelvis
   // Settings with which the motion network was trained:
   enum class Path { velocity, relative, absolute } path_ = Path::velocity;
@@ -142,12 +143,9 @@ class Retargeter final : public System {
     bool filled;
   };
   std::vector<Asked> asked_;
-  int64_t frame_ = 0;     ///< number of source frames received or missed
-  int64_t missed_ = 0;    ///< number of source frames missed since the last one that was received
-  int64_t grid_ = 0;      ///< number of grid frames shown to the network
-  int64_t answered_ = 0;  ///< number of grid frames answered
-  std::vector<RetargetedFrame> frames_;  ///< those of the last call first; is never made smaller
-  FrameTimes times_;
+  int64_t grid_ = 0;       ///< number of grid frames shown to the network
+  int64_t answered_ = 0;   ///< number of grid frames answered
+  RetargetedFrame frame_;  ///< that was shown last
 };
 
 }  // namespace restage

@@ -1,9 +1,8 @@
 #include "infer/systems.h"
 
 #include "autograd/base/format.h"
-#include "autograd/base/nearest.h"
+#include "autograd/base/registry.h"
 #include "infer/h4d.h"
-#include "infer/own_skin.h"
 #include "infer/registration/refinement.h"
 #include "infer/registration/registration.h"
 #include "infer/transfer.h"
@@ -11,15 +10,19 @@
 namespace restage {
 namespace {
 
-std::unique_ptr<Retargeter> make_retargeter(SystemInput in) {
+/// A Retargeter, or what is made from the same and from `more`.
+template <class Kind, class... More>
+std::unique_ptr<System> make_retargeter(SystemInput in, const More&... more) {
   if (in.rest)
-    return std::make_unique<Retargeter>(in.weights, in.weights_name, std::move(in.target), *in.rest,
-                                        in.options);
-  return std::make_unique<Retargeter>(in.weights, in.weights_name, std::move(in.target),
-                                      in.target_name, in.options);
+    return std::make_unique<Kind>(more..., in.weights, in.weights_name, std::move(in.target),
+                                  *in.rest, in.options);
+  return std::make_unique<Kind>(more..., in.weights, in.weights_name, std::move(in.target),
+                                in.target_name, in.options);
 }
 
-std::unique_ptr<System> make_chain(SystemInput in) { return make_retargeter(std::move(in)); }
+std::unique_ptr<System> make_chain(SystemInput in) {
+  return make_retargeter<Retargeter>(std::move(in));
+}
 
 /// The chain with its motion network taken out: rotations are the closed form of the joints that
 /// the extractor finds, and are copied.
@@ -29,19 +32,19 @@ std::unique_ptr<System> make_copy(SystemInput in) {
   in.weights.put("motion",
                  {model, sizes, make_model(model, sizes, Init{RngKey{}, DType::f32}), {}});
   in.weights.erase(kLateMotion);
-  return make_retargeter(std::move(in));
+  return make_retargeter<Retargeter>(std::move(in));
 }
 
 std::unique_ptr<System> make_refinement(SystemInput in) {
   const std::string where = in.target_name;
   in.options.late = false;  // each cloud is fitted in its own frame
-  return std::make_unique<Refinement>(make_retargeter(std::move(in)), where);
+  return make_retargeter<Refinement>(std::move(in), where);
 }
 
 std::unique_ptr<System> make_registration(SystemInput in) {
   if (!in.rest)
     throw InputError(in.target_name, "comes without its rest joints, which registration needs",
-                     "give --rest R.h5, or a rigged character as the target");
+                     "give {rest} R.h5, or a rigged character as the target");
   return std::make_unique<Registration>(std::move(in.target), *in.rest, in.target_name);
 }
 
@@ -55,8 +58,8 @@ std::unique_ptr<System> make_h4d(SystemInput in) {
                                      in.target_name, in.rest, in.options);
 }
 
-std::vector<SystemType>& table() {
-  static std::vector<SystemType> all = {
+std::deque<SystemType> ours() {
+  return {
       {.name = "chain",
        .help = "extractor, motion network and deformation of the weights",
        .roles = {"skeleton", "motion"},
@@ -89,48 +92,41 @@ std::vector<SystemType>& table() {
        .each_cloud = true,
        .make = make_h4d},
   };
+}
+
+Registry<SystemType>& table() {
+  static Registry<SystemType> all("system", ours());
   return all;
 }
 
 }  // namespace
 
-const std::vector<SystemType>& systems() { return table(); }
+const std::deque<SystemType>& systems() { return table().all(); }
 
-void register_system(SystemType type) {
-  for (const SystemType& known : table())
-    if (known.name == type.name) throw Error("there is a system '" + type.name + "' already");
-  table().push_back(std::move(type));
-}
+void register_system(SystemType type) { table().add(std::move(type)); }
 
 std::unique_ptr<System> make_system(const SystemType& type, SystemInput input) {
   if (type.each_cloud && input.options.fps != kFps)
     throw InputError("",
-                     format("the source has %g frames a second, and --system %s answers each cloud",
+                     format("the source has %g frames a second, and {system} %s answers each cloud",
                             input.options.fps, type.name.c_str()),
-                     "give clouds at 30 frames a second, or use --system chain");
+                     "give clouds at 30 frames a second, or use {system} chain");
   const auto own = std::move(input.own);
   if (!own) return type.make(std::move(input));
   if (!type.own_skin)
     throw InputError(input.target_name,
-                     "has bones, and --system " + type.name + " moves vertices without bones",
+                     "has bones, and {system} " + type.name + " moves vertices without bones",
                      "use another system, or give the character as a mesh (.obj, .ply)");
   input.target = own->mesh();
   input.rest = own->rest();
   for (const std::string& role : type.surface) input.weights.erase(role);  // would not be shown
-  return std::make_unique<OwnSkin>(type.make(std::move(input)), own);
+  auto system = type.make(std::move(input));
+  system->wear(own);
+  return system;
 }
 
 const SystemType& system_type(const std::string& name, const std::string& where) {
-  std::vector<std::string> names;
-  std::string all;
-  for (const SystemType& type : systems()) {
-    if (type.name == name) return type;
-    names.push_back(type.name);
-    all += (all.empty() ? "" : ", ") + type.name;
-  }
-  const std::string near = nearest(name, names);
-  throw InputError(where, "there is no system '" + name + "'",
-                   near.empty() ? "use one of " + all : "did you mean '" + near + "'?");
+  return table().get(name, where);
 }
 
 }  // namespace restage

@@ -2,6 +2,7 @@
 // or register_system() from a program of one's own.
 #pragma once
 
+#include <deque>
 #include <memory>
 #include <optional>
 #include <string>
@@ -36,7 +37,7 @@ struct SystemType {
   std::unique_ptr<System> (*make)(SystemInput input);
 };
 
-const std::vector<SystemType>& systems();
+const std::deque<SystemType>& systems();
 /// Adds a system of a program that uses this library, before anything else is done. Error if there
 /// is one of that name.
 void register_system(SystemType type);

@@ -1,7 +1,6 @@
 #include "infer/transfer.h"
 
 #include <algorithm>
-#include <chrono>
 #include <numeric>
 
 #include "autograd/base/error.h"
@@ -140,67 +139,49 @@ Points Transfer::of_all(const Tensor& moved) const {
   return (*embedded_)(out);
 }
 
-/// Frames for the clouds that were missed between the one that is shown and `posed`.
-void Transfer::fill_gap(const Tensor& window, const Points& posed, const Point& below) {
-  for (int64_t k = 1; k <= missed_; ++k) {
-    const float share = static_cast<float>(k) / static_cast<float>(missed_ + 1);
-    RetargetedFrame& filled = frames_.emplace_back();
-    filled.filled = true;
-    filled.vertices = posed;
-    if (!shown_) continue;
-    Context ctx;
-    if (const auto made = model_->between(ctx, {concat({before_, window}, 0), identity_}, share)) {
-      filled.vertices = of_all(made->value);
-      stand(filled.vertices, (1 - share) * stood_ + share * below);
-    } else {
-      for (size_t i = 0; i < posed.size(); ++i)
-        filled.vertices[i] = (1 - share) * (*shown_)[i] + share * posed[i];
-    }
+void Transfer::mix(const RetargetedFrame& before, double share, RetargetedFrame& frame) const {
+  const auto t = static_cast<float>(share);
+  Context ctx;
+  if (const auto made =
+          model_->between(ctx, {concat({before_.window, now_.window}, 0), identity_}, t)) {
+    frame.vertices = of_all(made->value);
+    stand(frame.vertices, (1 - t) * before_.below + t * now_.below);
+  } else {
+    for (size_t i = 0; i < frame.vertices.size(); ++i)
+      frame.vertices[i] = (1 - t) * before.vertices[i] + t * frame.vertices[i];
   }
-  missed_ = 0;
 }
 
-std::span<const RetargetedFrame> Transfer::push(const Points& cloud, const std::string& source) {
+void Transfer::answer(const Points& cloud, const std::string& source, const Show& show) {
   require_body(cloud, source);
-  const auto begun = std::chrono::steady_clock::now();
+  {
+    const Stopwatch watch(&times_.deformation);
+    perform(cloud, source);
+  }
+  show_after_gap(missed(), frame_, show);
+}
+
+/// The frame of a cloud.
+void Transfer::perform(const Points& cloud, const std::string& source) {
   const Box there = box_of(cloud);
   tallest_ = std::max(tallest_, there.sizes().y());
   Points seen = seen_of(cloud, source);
   move(seen, -there.center());
   window_.push_back(std::move(seen));
   while (std::ssize(window_) > model_->frames()) window_.pop_front();
+  before_ = std::move(now_);
   Context ctx;
-  const Tensor window = seen_window();
-  Points posed = of_all(model_->forward(ctx, {window, identity_, true}).value);
+  now_.window = seen_window();
+  frame_.vertices = of_all(model_->forward(ctx, {now_.window, identity_, true}).value);
   const float scale = tallest_ > 0 ? height_ / tallest_ : 1;
-  const Point below(scale * there.center().x(), scale * there.min().y(),
-                    scale * there.center().z());
-  stand(posed, below);
-  frames_.clear();
-  fill_gap(window, posed, below);
-  frames_.emplace_back().vertices = posed;
-  shown_ = std::move(posed);
-  stood_ = below;
-  before_ = window;
-  times_.deformation =
-      std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
-  return frames_;
+  now_.below =
+      Point(scale * there.center().x(), scale * there.min().y(), scale * there.center().z());
+  stand(frame_.vertices, now_.below);
 }
 
-std::span<const RetargetedFrame> Transfer::finish() {
-  frames_.clear();
-  for (; shown_ && missed_ > 0; --missed_) {
-    RetargetedFrame& filled = frames_.emplace_back();
-    filled.vertices = *shown_;
-    filled.filled = true;
-  }
-  return frames_;
-}
-
-void Transfer::restart() {
+void Transfer::forget() {
+  EachCloud::forget();
   window_.clear();
-  shown_.reset();
-  missed_ = 0;
   tallest_ = 0;
 }
 

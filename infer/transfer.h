@@ -6,8 +6,8 @@
 #include <memory>
 #include <optional>
 
+#include "infer/each_cloud.h"
 #include "infer/retargeter.h"
-#include "infer/system.h"
 #include "nn/geometry/embedded_mesh.h"
 #include "nn/models/transfer.h"
 #include "nn/weights/bundle.h"
@@ -30,30 +30,33 @@ bool needs_correspondence(const Bundle& weights);
 /// it is shown as many evenly spread vertices of the target, and the others follow them
 /// (nn/geometry/embedded_mesh.h). A network that needs correspondence (TST) takes clouds whose
 /// points are the target's vertices in their order, and is shown the very vertices of its training.
-class Transfer final : public System {
+class Transfer final : public EachCloud {
  public:
   /// `where` names the target in errors, `weights_name` the weights. InputError: no network of this
   /// role; a target of another mesh than a network that needs correspondence was trained on.
   Transfer(const Bundle& weights, const std::string& weights_name, Mesh target,
            const std::string& where, const RetargetOptions& options);
 
-  std::span<const RetargetedFrame> push(const Points& cloud, const std::string& source) override;
-  void miss() override { ++missed_; }
-  std::span<const RetargetedFrame> finish() override;
-  void restart() override;
   const Mesh& target() const override { return target_; }
-  const SystemRig* rig() const override { return nullptr; }
-  Points posed(const Pose&) const override { return {}; }
   const Joints* target_joints() const override { return nullptr; }
   const Joints* source_joints() const override { return nullptr; }
-  FrameTimes times() const override { return times_; }
 
  private:
+  void answer(const Points& cloud, const std::string& source, const Show& show) override;
+  void forget() override;
+  void place(RetargetedFrame&) const override {}
+  void mix(const RetargetedFrame& before, double share, RetargetedFrame& frame) const override;
+  void perform(const Points& cloud, const std::string& source);
   [[noreturn]] void refuse_mesh(const std::string& where, const std::string& weights_name) const;
   Points seen_of(const Points& cloud, const std::string& source) const;
   Tensor seen_window() const;
   Points of_all(const Tensor& moved) const;
-  void fill_gap(const Tensor& window, const Points& posed, const Point& below);
+
+  /// What the network saw of a cloud, and the middle of the floor of the target's box then.
+  struct Moment {
+    Tensor window;
+    Point below = {};
+  };
 
   std::shared_ptr<TransferModel> model_;
   Mesh target_;
@@ -62,16 +65,12 @@ class Transfer final : public System {
   std::optional<EmbeddedMesh> embedded_;
   Tensor identity_;  // [1, v, 3] in that order
   uint64_t seed_;
-  int64_t points_;               // of a cloud that the network is given
-  float height_ = 0;             // of the target
-  float tallest_ = 0;            // cloud so far
-  std::deque<Points> window_;    // centred, the newest last
-  std::optional<Points> shown_;  // for the last cloud
-  Point stood_ = {};             // the middle of its box's floor
-  Tensor before_;                // what the network saw for it
-  int64_t missed_ = 0;           // frames of the source since the last cloud
-  FrameTimes times_;
-  std::vector<RetargetedFrame> frames_;  // of the last push
+  int64_t points_;             // of a cloud that the network is given
+  float height_ = 0;           // of the target
+  float tallest_ = 0;          // cloud so far
+  std::deque<Points> window_;  // centred, the newest last
+  Moment before_, now_;        // of the last cloud and the one before it
+  RetargetedFrame frame_;      // of the last cloud
 };
 
 }  // namespace restage

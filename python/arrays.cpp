@@ -1,15 +1,15 @@
 #include "python/arrays.h"
 
 #include <cmath>
+#include <span>
 
 #include "autograd/base/error.h"
+#include "autograd/base/words.h"
 
 namespace restage::python {
 
 std::string shape_text(const py::array& a) {
-  std::string out = "[";
-  for (py::ssize_t i = 0; i < a.ndim(); ++i) out += (i ? ", " : "") + std::to_string(a.shape(i));
-  return out + "]";
+  return "[" + joined(std::span(a.shape(), static_cast<size_t>(a.ndim()))) + "]";
 }
 
 void refuse_mask(const py::handle& value, const std::string& what) {
@@ -39,17 +39,23 @@ template py::array_t<float, py::array::c_style> numbers<float>(const py::handle&
 template py::array_t<double, py::array::c_style> numbers<double>(const py::handle&,
                                                                  const std::string&);
 
-Points points_of(const py::handle& value, const std::string& what) {
+Cloud cloud_of(const py::handle& value, const std::string& what) {
   const auto a = numbers<float>(value, what);
   if (a.ndim() != 2 || a.shape(1) != 3)
     throw InputError(what, "has the shape " + shape_text(a), "give points as [n, 3], metres, y up");
-  Points out;
-  out.reserve(static_cast<size_t>(a.shape(0)));
+  Cloud out;
+  out.points.reserve(static_cast<size_t>(a.shape(0)));
   const float* p = a.data();
   for (py::ssize_t i = 0; i < a.shape(0); ++i, p += 3)
     if (std::isfinite(p[0]) && std::isfinite(p[1]) && std::isfinite(p[2]))
-      out.emplace_back(p[0], p[1], p[2]);
-  if (out.empty()) throw InputError(what, "holds no points", "give a cloud of a person");
+      out.points.emplace_back(p[0], p[1], p[2]);
+  out.left_out = static_cast<size_t>(a.shape(0)) - out.points.size();
+  return out;
+}
+
+Cloud some_cloud_of(const py::handle& value, const std::string& what) {
+  Cloud out = cloud_of(value, what);
+  if (out.points.empty()) throw InputError(what, "holds no points", "give a cloud of a person");
   return out;
 }
 

@@ -21,8 +21,14 @@ void refuse_mask(const py::handle& value, const std::string& what);
 /// "[2, 3]"
 std::string shape_text(const py::array& a);
 
-/// [n, 3]: points that are NaN or infinite are left out, as readers of files do.
-Points points_of(const py::handle& value, const std::string& what);
+struct Cloud {
+  Points points;
+  size_t left_out = 0;  ///< points that were NaN or infinite, as in Frame
+};
+/// [n, 3]; n may be 0. InputError naming `what` for anything else.
+Cloud cloud_of(const py::handle& value, const std::string& what);
+/// The same; InputError also where no point is left.
+Cloud some_cloud_of(const py::handle& value, const std::string& what);
 /// [22, 3]
 Joints joints_of(const py::handle& value, const std::string& what);
 /// [frames, 22, 3], or one frame.

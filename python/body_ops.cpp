@@ -88,12 +88,6 @@ void add_forms(py::module_& m) {
               &matrix_to_quaternion);
   from_matrix("matrix_to_axis_angle", "[..., 3, 3] -> [..., 3], radians; no gradient",
               &matrix_to_axis_angle);
-  m.def(
-      "atan2",
-      [](const O& y, const O& x) {
-        return op_of([](const Var& yv, const Var& xv) { return atan2(yv, xv); }, y, x);
-      },
-      py::arg("y"), py::arg("x"), "Angle of the direction (x, y), radians in (-pi, pi].");
 }
 
 void add_skeletons(py::module_& m) {

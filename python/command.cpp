@@ -24,13 +24,6 @@ std::string bytes_of(const py::handle& text, const std::string& what) {
   return out;
 }
 
-/// Options of a program that prints, which would say nothing here.
-bool of_the_shell(const std::string& name) {
-  for (const char* other : {"json", "quiet", "help", "version", "threads"})
-    if (name == other) return true;
-  return false;
-}
-
 std::string value_of(const std::string& name, const py::handle& value) {
   if (PyObject_HasAttrString(value.ptr(), "__fspath__") || PyBytes_Check(value.ptr()))
     return path_of(value);
@@ -93,8 +86,11 @@ std::vector<std::string> flags_of(const Words& given,
       throw InputError("", "'" + name + "' is " + (on ? "True" : "False") + ", and needs a value",
                        "give the value" + std::string(on ? "" : ", or None"));
     const bool negative = named(no) != known.end();
+    const bool older = std::any_of(known.begin(), known.end(), [&](const auto& o) {
+      return std::find(o.formerly.begin(), o.formerly.end(), yes) != o.formerly.end();
+    });
     if (!on && negative) out.push_back(no);
-    if (flag == known.end() ? !negative : on) out.push_back(yes);
+    if (flag == known.end() && !older ? !negative : on) out.push_back(yes);
   }
   return out;
 }
@@ -140,6 +136,38 @@ std::string run_words(const py::args& arguments, const py::kwargs& options) {
   return watch.run([&] { return run_command(name, given, cli::add_commands); });
 }
 
+/// As Python writes it; None where nothing is the default.
+py::object default_of(const cli::CommandTree::Option& option, bool negative) {
+  if (option.kind == cli::ValueKind::flag) return py::bool_(negative);
+  if (option.default_value.empty() || option.several) return py::none();
+  if (option.kind == cli::ValueKind::whole) return py::int_(std::stoll(option.default_value));
+  if (option.kind == cli::ValueKind::number) return py::float_(std::stod(option.default_value));
+  return py::str(option.default_value);
+}
+
+/// {keyword: default} of a command, or of "System".
+py::dict option_defaults(const std::string& name) {
+  cli::CommandTree tree;
+  if (name == "System") {
+    tree = cli::system_options();
+  } else {
+    cli::Program program;
+    cli::add_commands(program);
+    for (const cli::CommandTree& command : program.tree().commands)
+      if (command.name == name) tree = command;
+  }
+  py::dict out;
+  for (const cli::CommandTree::Option& option : tree.options) {
+    std::string key = option.name.substr(2);
+    if (cli::is_for_shells(key)) continue;
+    const bool negative = option.kind == cli::ValueKind::flag && key.starts_with("no-");
+    if (negative) key = key.substr(3);
+    std::replace(key.begin(), key.end(), '-', '_');
+    out[py::str(key)] = default_of(option, negative);
+  }
+  return out;
+}
+
 }  // namespace
 
 std::string path_of(const py::handle& path) {
@@ -167,7 +195,7 @@ Words words_of(const py::dict& options) {
     std::string name = bytes_of(key, "an option");
     for (char& c : name)
       if (c == '_') c = '-';
-    if (of_the_shell(name) || name.find('=') != std::string::npos)
+    if (cli::is_for_shells(name) || name.find('=') != std::string::npos)
       refuse("--" + name, name == "threads" ? "call restage.set_threads()" : "leave it out");
     verbose = verbose || (name == "verbose" && PyObject_IsTrue(value.ptr()) == 1);
     append_option(name, value, out);
@@ -189,6 +217,12 @@ std::string run_command(const std::string& name, Words given,
   for (std::string& flag : flags_of(given, options_of(program, words)))
     words.push_back(std::move(flag));
   read_options(program, words);
+  if (!program.renamed().empty()) {
+    const py::gil_scoped_acquire acquired;
+    for (const std::string& remark : program.renamed())
+      if (PyErr_WarnEx(PyExc_DeprecationWarning, remark.c_str(), 1) != 0)
+        throw py::error_already_set();
+  }
   return captured.text;
 }
 
@@ -218,6 +252,8 @@ void add_command(py::module_& m) {
   set_log_level(LogLevel::quiet);
   m.def("run", &run_words,
         "Runs `restage WORDS --options --json` in this process and returns what it would print.");
+  m.def("option_defaults", &option_defaults,
+        "The keywords of a command, or of System, with their defaults; None: none.");
   m.def("set_threads", &use_threads, py::arg("n"),
         "How many threads compute from now on; 0: as many as there are cores. Results have the "
         "same bits for any number.");

@@ -1,4 +1,5 @@
 // Calling a network: what each role takes and gives.
+#include "autograd/base/words.h"
 #include "nn/models/deformation.h"
 #include "nn/models/motion.h"
 #include "nn/models/skeleton.h"
@@ -12,15 +13,15 @@ namespace {
 void check(const PyVar& v, const char* what, std::initializer_list<int64_t> sizes) {
   bool ok = v.var.rank() == static_cast<int>(sizes.size()) && v.var.dtype() == DType::f32;
   int axis = 0;
-  std::string wanted;
   for (const int64_t size : sizes) {
-    wanted += (axis ? ", " : "") + (size < 0 ? std::string("any") : std::to_string(size));
     ok = ok && (size < 0 ? v.var.size(axis) > 0 : v.var.size(axis) == size);
     ++axis;
   }
   if (!ok)
     throw ShapeError(std::string(what) + " is " + v.var.shape().str() + " " +
-                     name_of(v.var.dtype()) + "; the network takes [" + wanted + "] float32");
+                     name_of(v.var.dtype()) + "; the network takes [" +
+                     joined(sizes, [](int64_t n) { return n < 0 ? "any" : std::to_string(n); }) +
+                     "] float32");
 }
 
 struct Call {

@@ -15,6 +15,8 @@ set_target_properties(restage_python PROPERTIES OUTPUT_NAME _core CXX_VISIBILITY
 target_link_libraries(restage_python PRIVATE restage_experiments restage_gradcheck pybind11::headers restage_options)
 target_link_options(restage_python PRIVATE LINKER:--exclude-libs,ALL)
 restage_glue(restage_python)
+restage_precompile(restage_python <pybind11/pybind11.h> <pybind11/numpy.h> <pybind11/stl.h>)
+restage_join_files(restage_python 4)
 restage_library_first(restage_python)
 
 # The package around it.

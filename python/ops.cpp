@@ -23,9 +23,10 @@ void unary(py::module_& m, const char* name, const char* number, const char* doc
       py::arg("x"), py::arg(number), doc);
 }
 template <class F>
-void binary_op(py::module_& m, const char* name, const char* doc, F f) {
+void binary_op(py::module_& m, const char* name, const char* doc, F f, const char* first = "a",
+               const char* second = "b") {
   m.def(
-      name, [f](const O& a, const O& b) { return op_of(f, a, b); }, py::arg("a"), py::arg("b"),
+      name, [f](const O& a, const O& b) { return op_of(f, a, b); }, py::arg(first), py::arg(second),
       doc);
 }
 
@@ -43,12 +44,11 @@ void add_elementwise(py::module_& m) {
   unary(m, #name, #number, help, [](const Var& x, double c) { return name(x, c); });
   RESTAGE_UNARY_WITH_NUMBER(RESTAGE_BIND)
 #undef RESTAGE_BIND
-  binary_op(m, "add", "a + b, broadcast as in NumPy",
-            [](const Var& a, const Var& b) { return add(a, b); });
-  binary_op(m, "sub", "a - b", [](const Var& a, const Var& b) { return sub(a, b); });
-  binary_op(m, "mul", "a b, element by element",
-            [](const Var& a, const Var& b) { return mul(a, b); });
-  binary_op(m, "div", "a / b", [](const Var& a, const Var& b) { return div(a, b); });
+#define RESTAGE_BIND(name, a, b, help, ...) \
+  binary_op(                                \
+      m, #name, help, [](const Var& p, const Var& q) { return name(p, q); }, #a, #b);
+  RESTAGE_BINARY(RESTAGE_BIND)
+#undef RESTAGE_BIND
   m.def(
       "expand",
       [](const O& x, const O& shape) {
@@ -89,6 +89,22 @@ PyVar concat_of(const std::vector<py::object>& xs, int axis) {
   return run_op(pointers, [&] { return concat(std::span<const Var>(values), axis); });
 }
 
+std::vector<PyVar> split_of(const O& x, int axis, const std::vector<int64_t>& sizes) {
+  if (sizes.size() > kMaxInputs)
+    throw ShapeError("split: at most " + std::to_string(kMaxInputs) + " parts");
+  Split op{axis, {}};
+  for (const int64_t size : sizes) op.sizes.push_back(size);
+  const PyVar whole = var_of(x);
+  Vars parts;
+  const PyVar first = run_op(std::array{&whole}, [&] {
+    parts = call(op, {whole.var});
+    return parts[0];
+  });
+  std::vector<PyVar> out;
+  for (const Var& part : parts) out.push_back({part, first.tape});
+  return out;
+}
+
 void add_layout(py::module_& m) {
   m.def(
       "reshape",
@@ -109,6 +125,8 @@ void add_layout(py::module_& m) {
       },
       py::arg("x"), py::arg("axis"), py::arg("start"), py::arg("stop"),
       "Elements [start, stop) along an axis.");
+  m.def("split", &split_of, py::arg("x"), py::arg("axis"), py::arg("sizes"),
+        "The parts of these sizes along an axis; the sizes add up to its size.");
   m.def("concat", &concat_of, py::arg("xs"), py::arg("axis"), "Joins tensors along an axis.");
   m.def(
       "repeat_items",

@@ -149,9 +149,10 @@ void add_steps(Class& c) {
 }  // namespace
 
 void add_optim(py::module_& m) {
-  py::class_<PyAdam> adam(
-      m, "Adam",
-      "Adam, exactly as PyTorch's. parameters: a Model, a dict or a list of Parameters.");
+  py::class_<PyAdam> adam(m, "Adam",
+                          "Adam as PyTorch's: in float64 to rounding, in float32 to 1e-5 of a "
+                          "step. parameters: a Model, "
+                          "a dict or a list of Parameters.");
   adam.def(py::init<const py::object&, double, double, double, double, double>(),
            py::arg("parameters"), py::arg("rate") = 1e-3, py::arg("beta1") = 0.9,
            py::arg("beta2") = 0.999, py::arg("eps") = 1e-8, py::arg("weight_decay") = 0.0);

@@ -43,11 +43,11 @@ Grads grads_of(const py::object& answer, const Saved& saved, Needs needs, const 
 
 struct OwnFunction final : Tape::Function {
   OwnFunction(Shared f, Saved s) : functions(std::move(f)), kept(std::move(s)) {}
-  Grads backward(const Tensor& gy, Needs needs) const override {
+  Grads backward(std::span<const Tensor> gy, Needs needs) const override {
     const py::gil_scoped_acquire acquired;
     // inputs and result, as forward() kept them
     py::list arguments;
-    arguments.append(array_of(gy));
+    arguments.append(array_of(gy[0]));
     arguments.append(array_of(kept.tensors().back()));
     for (size_t i = 0; i + 1 < kept.tensors().size(); ++i) arguments.append(array_of(kept[i]));
     const py::object answer = functions->backward(*py::tuple(arguments));

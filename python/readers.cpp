@@ -1,10 +1,10 @@
 // Files that the program reads, as arrays: meshes, clouds, motions.
 #include <variant>
 
-#include "datasets/importers/skeleton_take.h"
-#include "datasets/readers/frame_folder.h"
-#include "datasets/readers/mesh_io.h"
-#include "experiments/cli/source_options.h"
+#include "datasets/importers/motions/skeleton_take.h"
+#include "datasets/readers/clouds/mesh_io.h"
+#include "datasets/readers/frames/frame_folder.h"
+#include "experiments/cli/perform/source_options.h"
 #include "experiments/source.h"
 #include "python/arrays.h"
 

@@ -1,6 +1,7 @@
 // restage.retarget: the command, with arrays in and out where there are no files.
-#include "experiments/cli/retarget.h"
+#include "experiments/cli/perform/retarget.h"
 
+#include "datasets/readers/frames/memory_frames.h"
 #include "experiments/cli/output.h"
 #include "python/arrays.h"
 
@@ -8,25 +9,16 @@ namespace restage::python {
 namespace {
 
 /// Clouds that were given as arrays, without points where there was none.
-class ArrayFrames final : public FrameSource {
- public:
-  explicit ArrayFrames(std::vector<Points> clouds) : clouds_(std::move(clouds)) {}
-  std::optional<Frame> next() override {
-    if (at_ == clouds_.size()) return std::nullopt;
+std::unique_ptr<FrameSource> frames_of(std::vector<Cloud> clouds) {
+  const size_t count = clouds.size();
+  return std::make_unique<MemoryFrames>(count, [clouds = std::move(clouds)](size_t i) {
     Frame out;
-    out.source = "clouds:" + std::to_string(at_);
-    out.points = clouds_[at_++];
+    out.source = "clouds:" + std::to_string(i);
+    out.points = clouds[i].points;
+    out.left_out = clouds[i].left_out;
     return out;
-  }
-  void skip() override { at_ = std::min(at_ + 1, clouds_.size()); }
-  void rewind() override { at_ = 0; }
-  int64_t frames() const override { return std::ssize(clouds_); }
-  double fps() const override { return kFps; }
-
- private:
-  std::vector<Points> clouds_;
-  size_t at_ = 0;
-};
+  });
+}
 
 /// Frames as they come, one after the other.
 struct Arrays {
@@ -79,15 +71,15 @@ py::dict dict_of(Arrays arrays, const std::string& document) {
   return out;
 }
 
-std::vector<Points> clouds_of(const py::handle& source) {
+std::vector<Cloud> clouds_of(const py::handle& source) {
   if (!py::isinstance<py::iterable>(source))
     throw InputError("source", "is neither a file's name nor a sequence of clouds",
                      "give a path, or arrays of [n, 3]");
-  std::vector<Points> out;
+  std::vector<Cloud> out;
   for (const py::handle cloud : source) {
     if (PyErr_CheckSignals() != 0) throw py::error_already_set();
     const std::string name = "clouds:" + std::to_string(out.size());
-    out.push_back(cloud.is_none() ? Points() : points_of(cloud, name));
+    out.push_back(cloud.is_none() ? Cloud() : cloud_of(cloud, name));
   }
   return out;
 }
@@ -117,7 +109,7 @@ py::object run(const py::object& source, const py::object& target, const py::obj
   if (names_a_file(source))
     given.words.push_back("--source=" + path_of(source));
   else
-    caller.clouds = std::make_unique<ArrayFrames>(clouds_of(source));
+    caller.clouds = frames_of(clouds_of(source));
   if (caller.clouds) c.source.path = "clouds";
   std::string document;
   watch.run([&] {

@@ -3,7 +3,7 @@
 
 #include "autograd/kernels/kernel.h"
 #include "datasets/doctor/examine.h"
-#include "experiments/cli/standard_weights.h"
+#include "experiments/cli/perform/standard_weights.h"
 #include "nn/models/extraction.h"
 #include "nn/weights/bundle.h"
 #include "python/arrays.h"
@@ -17,7 +17,7 @@ class PyExtractor {
   PyExtractor(const py::object& weights, int samples, uint64_t seed, const std::string& device)
       : key_(RngKey{seed, 0}.fold("skeleton")) {
     if (samples < 1 || samples > 256)
-      throw InputError("", "--samples is out of range", "give a number from 1 to 256");
+      throw InputError("", "samples is out of range", "give a number from 1 to 256");
     const std::string path = weights.is_none() ? "" : path_of(weights);
     const py::gil_scoped_release released;
     const std::string file = path.empty() ? cli::standard_weights() : path;
@@ -25,11 +25,11 @@ class PyExtractor {
     auto& model = models_.need_as<SkeletonModel>("skeleton", weights_path(file));
     move_module(model, device_of(device));
     definition_ = joint_definition(models_.only({"skeleton"}), file);
-    extract_.emplace(model, samples, kAllAround, false, true);
+    extract_.emplace(model, LookOptions{.samples = samples, .any_size = true, .any_way_up = true});
   }
 
   py::tuple operator()(const py::object& points, const std::string& name) {
-    const Points cloud = points_of(points, name);
+    const Points cloud = some_cloud_of(points, name).points;
     check_frame(cloud, name, FrameMends::none);
     SeenJoints seen;
     {

@@ -6,8 +6,8 @@
 #include <mutex>
 
 #include "datasets/doctor/examine.h"
-#include "experiments/cli/retarget.h"
-#include "experiments/cli/source_options.h"
+#include "experiments/cli/perform/retarget.h"
+#include "experiments/cli/perform/source_options.h"
 #include "experiments/source.h"
 #include "python/arrays.h"
 
@@ -48,38 +48,26 @@ class PySystem {
     watch.run([&] {
       run_command("retarget", given, [&](cli::Program& program) {
         const auto make_it = [&] { return make(program.common()), 0; };
-        add_options(program.add("retarget", "", "", make_it));
+        cli::add_live_options(program.add("retarget", "", "", make_it), c_);
       });
     });
   }
 
-  Frames push(const py::object& points, const std::string& name) {
-    Points cloud = points_of(points, name);
-    return locked([&] {
-      const auto start = std::chrono::steady_clock::now();
-      (*to_ours_)(cloud);
-      if (!c_.options.force) {
-        check_frame(cloud, name);
-        watch_->look(cloud, name);
-      }
-      const std::span<const RetargetedFrame> made = [&] {
-        try {
-          return system_->push(cloud, name);
-        } catch (const UnusableCloud&) {
-          // Somebody may have come.
-          if (clear_) watch_.emplace(frame_of(c_.source), true);
-          clear_ = false;
-          throw;
-        }
-      }();
-      clear_ = true;
-      frame_seconds_ =
-          std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-      return copy(made);
-    });
+  Frames push_all(const py::object& points, const std::string& name) {
+    Frames out;
+    push(points, name, into(out));
+    return out;
+  }
+  /// The newest frame; null: none is finished.
+  std::shared_ptr<Frame> push_newest(const py::object& points, const std::string& name) {
+    std::shared_ptr<Frame> out;
+    push(points, name, [&](const RetargetedFrame& f) { out = std::make_shared<Frame>(f); });
+    return out;
   }
   Frames finish() {
-    return locked([&] { return copy(system_->finish()); });
+    Frames out;
+    locked([&] { system_->finish(into(out)); });
+    return out;
   }
   void miss() {
     locked([&] { system_->miss(); });
@@ -102,6 +90,10 @@ class PySystem {
     return seen ? py::object(array_of(*seen)) : py::none();
   }
 
+  size_t points_left_out() {
+    return locked([&] { return left_out_; });
+  }
+
   py::dict times() {
     FrameTimes t;
     double frame = 0;
@@ -113,24 +105,29 @@ class PySystem {
   }
 
  private:
-  void add_options(cli::CommandOptions app) {
-    cli::add_target_options(app, c_);
-    cli::add_weights_options(app, c_);
-    cli::add_system_options(app, c_);
-    app.add_flag("--late", c_.options.late, "use the weights' network that looks ahead");
-    app.add_option("--fps", c_.source.fps, "frames per second of the clouds");
-    cli::add_source_up(app, c_.source);
-    cli::add_scale(app, c_.source.scale, "the clouds' units in metres");
-    app.add_flag("--force", c_.options.force, "accept what the doctor calls wrong");
+  static System::Show into(Frames& out) {
+    return [&out](const RetargetedFrame& f) { out.push_back(std::make_shared<Frame>(f)); };
+  }
+
+  void push(const py::object& points, const std::string& name, const System::Show& show) {
+    Cloud given = some_cloud_of(points, name);
+    locked([&] {
+      const auto start = std::chrono::steady_clock::now();
+      Points& cloud = given.points;
+      left_out_ += given.left_out;
+      to_ours_->clean(cloud);
+      door_->pass(cloud, name, [&] { system_->push(cloud, name, show); });
+      frame_seconds_ =
+          std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    });
   }
 
   void make(const cli::Common& common) {
     cli::check_options(c_.options, system_type(c_.system));
     to_ours_.emplace(c_.source.scale, c_.source.up);
-    watch_.emplace(frame_of(c_.source));
+    door_.emplace(frame_of(c_.source), c_.options.force);
     if (c_.source.fps && !(*c_.source.fps >= 1 && *c_.source.fps <= 1000))
-      throw InputError("", "--fps is out of range",
-                       "give the clouds' frames per second, 1 to 1000");
+      throw InputError("", "fps is out of range", "give the clouds' frames per second, 1 to 1000");
     SystemInput input = cli::load_input(c_, common);
     if (c_.source.fps) input.options.fps = *c_.source.fps;
     TargetMesh target = read_target(c_.target, c_.bones);
@@ -146,18 +143,12 @@ class PySystem {
     return work();
   }
 
-  static Frames copy(std::span<const RetargetedFrame> frames) {
-    Frames out;
-    for (const RetargetedFrame& f : frames) out.push_back(std::make_shared<Frame>(f));
-    return out;
-  }
-
   std::mutex mutex_;
   double frame_seconds_ = 0;  // of C++ in the last push
+  size_t left_out_ = 0;
   cli::RetargetCommand c_;
   std::optional<ToOurs> to_ours_;
-  std::optional<SourceWatch> watch_;
-  bool clear_ = false;  // the system took the last cloud that it was given
+  std::optional<CloudDoor> door_;
   std::unique_ptr<System> system_;
 };
 
@@ -224,18 +215,12 @@ void add_system(py::module_& m) {
   add_frame(m);
   py::class_<PySystem>(m, "System")
       .def(py::init<const py::object&, const py::object&, const py::dict&>())
-      .def("push_all", &PySystem::push, py::arg("points"), py::arg("name") = "cloud",
+      .def("push_all", &PySystem::push_all, py::arg("points"), py::arg("name") = "cloud",
            "Takes the next cloud, [n, 3] in metres, y up (or as scale and source_up say), and "
            "returns the frames that it finishes, as a list. InputError leaves the system as it "
            "was: call miss() for that cloud.")
-      .def(
-          "push",
-          [](PySystem& self, const py::object& points, const std::string& name) {
-            const Frames frames = self.push(points, name);
-            return frames.empty() ? nullptr : frames.back();
-          },
-          py::arg("points"), py::arg("name") = "cloud",
-          "As push_all(), but returns the newest frame, or None where none is finished.")
+      .def("push", &PySystem::push_newest, py::arg("points"), py::arg("name") = "cloud",
+           "As push_all(), but returns the newest frame, or None where none is finished.")
       .def("finish", &PySystem::finish,
            "Says that the source has ended; returns the frames that are left, as a list.")
       .def("miss", &PySystem::miss, "Says that a frame of the source is missing.")
@@ -248,6 +233,8 @@ void add_system(py::module_& m) {
       .def_property_readonly(
           "times", &PySystem::times,
           "how long the parts of the last push() took, seconds; frame: all that C++ did")
+      .def_property_readonly("points_left_out", &PySystem::points_left_out,
+                             "points of all clouds so far that were NaN or infinite")
       .def_property_readonly("source_joints", &PySystem::source_joints,
                              "float64 [22, 3], the source's joints in the last cloud, or None");
 }

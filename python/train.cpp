@@ -1,5 +1,5 @@
 // restage.train: the command, with a function that is called after every step.
-#include "experiments/cli/train.h"
+#include "experiments/cli/training/train.h"
 
 #include <atomic>
 

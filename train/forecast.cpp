@@ -10,8 +10,8 @@
 namespace restage {
 namespace {
 
-constexpr int64_t kLeast = 3, kMost = 30;  // steps
-constexpr double kEnough = 3;              // seconds
+constexpr int64_t kMost = 30;  // steps
+constexpr double kEnough = 3;  // seconds
 
 template <class Work>
 double seconds_of(Work&& work) {
@@ -49,7 +49,8 @@ StageForecast forecast(Stage& stage, MatmulPrecision precision, bool validate) {
     return seconds_of([&] { stage.step(i); });
   };
   const double first = step(0);
-  for (int64_t i = 1; i <= kMost && (i <= kLeast || spent < kEnough); ++i) {
+  if (first > kEnough) times.push_back(first);
+  for (int64_t i = 1; i <= kMost && first <= kEnough && spent < kEnough; ++i) {
     times.push_back(step(i));
     spent += times.back();
   }

@@ -18,7 +18,8 @@ struct StageForecast {
   double seconds(int64_t validate_every) const;
 };
 
-/// Takes some steps of the stage, which changes it. `validate`: measures one validation, too.
+/// Takes some steps of the stage, which changes it: three seconds of them, or one that takes
+/// longer. `validate`: measures one validation, too.
 StageForecast forecast(Stage& stage, MatmulPrecision precision, bool validate);
 
 int64_t count_parameters(const Stage& stage);

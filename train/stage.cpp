@@ -47,19 +47,36 @@ TrainedModel copied(const TrainedModel& of) {
   return out;
 }
 
-}  // namespace
-
-Points points_of(const Tensor& points, int64_t row, int64_t count) {
+/// Cloud number `number` of a tensor [..., v, 3].
+Points points_of(const Tensor& x, int64_t number) {
+  const int64_t v = x.size(-2);
   Points out;
-  for (int64_t i = row * count; i < (row + 1) * count; ++i)
-    out.emplace_back(Eigen::Map<const Point>(points.data<float>() + 3 * i));
+  for (int64_t i = number * v; i < (number + 1) * v; ++i)
+    out.emplace_back(Eigen::Map<const Point>(x.data<float>() + 3 * i));
   return out;
 }
 
-Joints joints_of(const Tensor& joints, int64_t row) {
-  Joints out;
-  const Points points = points_of(joints, row, kJoints);
-  for (size_t j = 0; j < kJoints; ++j) out[j] = points[j].cast<double>();
+}  // namespace
+
+Shown clouds_of(const std::string& label, const Tensor& x, const std::vector<int64_t>& numbers) {
+  Shown out{label, {}};
+  for (const int64_t number : numbers) out.clouds.push_back(points_of(x, number));
+  return out;
+}
+
+Shown skeletons_of(const std::string& label, const Tensor& x, const std::vector<int64_t>& numbers) {
+  Shown out{label, {}};
+  for (const int64_t number : numbers) {
+    const Points points = points_of(x, number);
+    for (size_t j = 0; j < kJoints; ++j)
+      (j == 0 ? out.skeletons.emplace_back() : out.skeletons.back())[j] = points[j].cast<double>();
+  }
+  return out;
+}
+
+std::vector<int64_t> spaced(int64_t n, int64_t first, int64_t every) {
+  std::vector<int64_t> out;
+  for (int64_t i = 0; i < n; ++i) out.push_back(first + i * every);
   return out;
 }
 
@@ -75,6 +92,15 @@ Optimiser* Stage::add_optimiser(const std::string& name, const std::vector<std::
                        "set " + name_ + ".optimiser.steps=0 to use it as it is");
   optimisers_.push_back({name, std::make_unique<Optimiser>(modules, config)});
   return optimisers_.back().optimiser.get();
+}
+
+OptimisedNumbers Stage::optimised() const {
+  OptimisedNumbers out;
+  for (const NamedOptimiser& o : optimisers_) {
+    out.muon += o.optimiser->numbers().muon;
+    out.adam += o.optimiser->numbers().adam;
+  }
+  return out;
 }
 
 void Stage::save(TensorFile& file) const {
@@ -156,9 +182,9 @@ std::vector<StateEntry> Stage::state() const {
 namespace {
 
 /// What a micro-batch leaves, as a row of numbers that is the same width for all micro-batches of
-/// all processes: a flag for each optimised parameter and each buffer, then the numbers of all of
-/// them. The flag of a parameter says whether it has a gradient (else its numbers are zero), that
-/// of a buffer whether the micro-batch has changed it.
+/// all processes: a flag for each optimised parameter and each buffer that passes change, then the
+/// numbers of all of them. The flag of a parameter says whether it has a gradient (else its numbers
+/// are zero), that of a buffer whether the micro-batch has changed it.
 class Row {
  public:
   /// `optimised`: identities of parameters, ascending.
@@ -166,15 +192,16 @@ class Row {
     for (const StateEntry& entry : state) {
       const Parameter* p = entry.parameter;
       if (p != nullptr && !std::binary_search(optimised.begin(), optimised.end(), p->id)) continue;
-      entries_.push_back({entry, *entry.value, *entry.value});
-      width_ += 1 + static_cast<size_t>(entry.value->numel());
+      const bool travels = p != nullptr || entry.changes;
+      (travels ? entries_ : constants_).push_back({entry, *entry.value, *entry.value});
+      if (travels) width_ += 1 + static_cast<size_t>(entry.value->numel());
     }
   }
   size_t width() const { return width_; }
   /// Whether micro-batches can be computed at once: no pass changes a buffer that all of them use.
   bool can_share() const {
     return std::none_of(entries_.begin(), entries_.end(),
-                        [](const Entry& e) { return e.state.changes; });
+                        [](const Entry& e) { return e.is_buffer(); });
   }
 
   /// Gives a micro-batch copies of the buffers as they were before the step.
@@ -182,12 +209,12 @@ class Row {
     for (Entry& e : entries_)
       if (e.is_buffer()) *e.state.value = e.begun = e.before.clone();
   }
-  /// Error if micro-batches that were computed at once have changed a buffer.
+  /// Error if a micro-batch has changed a buffer that does not travel.
   void require_unchanged() const {
-    for (const Entry& e : entries_)
-      if (e.is_buffer() && e.changed())
-        throw Error("micro-batches that were computed side by side have changed the buffer '" +
-                    e.state.name + "'; its module must say so (Module::changes_buffers)");
+    for (const Entry& e : constants_)
+      if (e.changed())
+        throw Error("micro-batches have changed the buffer '" + e.state.name +
+                    "'; its module must say so (Module::changes_buffers)");
   }
 
   std::vector<float> of(const Gradients& gradients) const {
@@ -243,7 +270,8 @@ class Row {
       return state.value->address() != begun.address() || state.value->version() != begun.version();
     }
   };
-  std::vector<Entry> entries_;
+  std::vector<Entry> entries_;    ///< of a row
+  std::vector<Entry> constants_;  ///< the other buffers
   size_t width_ = 0;
 };
 
@@ -271,7 +299,6 @@ Differentiated Stage::parts(const Optimiser& optimiser,
       std::vector<Differentiated> done(static_cast<size_t>(std::min(at_once, own - from)));
       in_groups(std::ssize(done), threads(),
                 [&](int64_t k) { done[static_cast<size_t>(k)] = compute(number(from + k)); });
-      row.require_unchanged();
       for (const Differentiated& d : done) give(d);
     }
   } else {  // a GPU also computes micro-batches one after the other
@@ -280,6 +307,7 @@ Differentiated Stage::parts(const Optimiser& optimiser,
       give(compute(number(k)));
     }
   }
+  row.require_unchanged();
   Differentiated out;
   row.spread(sum->total(), micro_batches_, &out.gradients);
   out.norm = out.gradients.norm();

@@ -3,6 +3,7 @@
 // handing on follow from that.
 #pragma once
 
+#include <algorithm>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -10,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "autograd/base/interrupt.h"
 #include "nn/geometry/body.h"
 #include "nn/module.h"
 #include "nn/weights/bundle.h"
@@ -28,10 +30,24 @@ struct Shown {
   std::vector<Points> clouds;
   std::vector<Joints> skeletons = {};
 };
-/// Points `row` * count to (`row` + 1) * count of a tensor [..., 3].
-Points points_of(const Tensor& points, int64_t row, int64_t count);
-/// Skeleton number `row` of a tensor [..., 22, 3].
-Joints joints_of(const Tensor& joints, int64_t row);
+/// The clouds of x [..., v, 3] with these numbers.
+Shown clouds_of(const std::string& label, const Tensor& x, const std::vector<int64_t>& numbers);
+/// The skeletons of x [..., 22, 3] with these numbers.
+Shown skeletons_of(const std::string& label, const Tensor& x, const std::vector<int64_t>& numbers);
+/// `n` numbers from `first` on, `every` apart.
+std::vector<int64_t> spaced(int64_t n, int64_t first = 0, int64_t every = 1);
+/// How many examples a row shows, of `n`.
+inline int64_t shown_of(int64_t n) { return std::min<int64_t>(8, n); }
+
+/// Calls work(first, count) for `n` held-out examples, at most `most` of them at once. Interrupted
+/// if a stop is asked for in between.
+template <class Work>
+void in_validation(int64_t n, int64_t most, Work&& work) {
+  for (int64_t first = 0; first < n; first += most) {
+    throw_if_stopped();
+    work(first, std::min(most, n - first));
+  }
+}
 
 /// One differentiation: runs `loss` on a fresh tape in training mode and returns the gradients of
 /// its first result. If loss or gradient is not finite the same step is repeated under FiniteCheck,
@@ -75,16 +91,20 @@ class Stage {
   /// them by heart. 0: never.
   void repeat_batches(int64_t batches) { repeated_ = batches; }
   /// Cuts every step into micro-batches, of which each process of a team computes some
-  /// (docs/notes/design/devices.md). InputError: the number of micro-batches does not divide the
-  /// batch, or the number of processes does not divide the number of micro-batches.
+  /// (docs/training.md, "Several processes"). InputError: the number of micro-batches does not
+  /// divide the batch, or the number of processes does not divide the number of micro-batches.
   void cut_steps(int64_t micro_batches, Team& team);
   /// Optimiser step number `step` (from 0). Everything random is a function of (seed, step), so a
   /// resumed run repeats the same bits. Returns what to log.
   virtual NamedValues step(int64_t step) = 0;
   /// The examples of step number `step`, as the losses read them.
   virtual NamedTensors examples(int64_t step) const = 0;
-  /// Figures of held-out examples, by the metrics of the evaluation.
+  /// Figures of held-out examples, by the metrics of the evaluation. Interrupted if a stop is asked
+  /// for between two of them (throw_if_stopped()).
   virtual NamedValues validate() = 0;
+  /// The names of those figures with this configuration, in their order. Empty: not known before
+  /// the first validation.
+  virtual std::vector<std::string> figures() { return {}; }
 
   /// Held-out examples with what the stage makes of them, at most three rows; may be empty.
   virtual std::vector<Shown> show() { return {}; }
@@ -99,6 +119,9 @@ class Stage {
   void start_from(const Bundle& weights, const std::vector<std::string>& names,
                   const std::string& where);
   bool started_from_weights() const { return started_from_weights_; }
+  bool wants_muon() const { return optimisation_.kind == OptimiserConfig::Kind::muon; }
+  /// How many numbers its optimisers leave to Muon and to Adam.
+  OptimisedNumbers optimised() const;
   /// The networks to be used later, by role. If the stage works in the host's memory they are
   /// shared with it, else they are copies in the host's memory.
   virtual Bundle result() const;

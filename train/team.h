@@ -1,6 +1,6 @@
 // Processes that train together. Each process computes some of a step's micro-batches. All
 // processes add up the same numbers in the same order, so the number of processes changes no bit
-// (docs/notes/design/devices.md).
+// (docs/decisions.md, "Devices and processes").
 #pragma once
 
 #include <cstddef>

@@ -11,6 +11,7 @@
 #include "autograd/base/format.h"
 #include "autograd/base/interrupt.h"
 #include "autograd/base/log.h"
+#include "autograd/base/words.h"
 #include "autograd/kernels/stats.h"
 #include "train/failure.h"
 #include "train/forecast.h"
@@ -20,15 +21,11 @@ namespace restage {
 namespace {
 
 constexpr int64_t kForecastAfter = 30;  // steps
+// In a checkpoint whose validation was left unfinished.
+constexpr const char* kUnvalidated = "loop.unvalidated";
 
 std::string line(const NamedValues& values) {
-  std::string out;
-  for (const auto& [name, value] : values) {
-    char text[64];
-    std::snprintf(text, sizeof text, "%s%s %.5g", out.empty() ? "" : ", ", name.c_str(), value);
-    out += text;
-  }
-  return out;
+  return joined(values, [](const auto& one) { return one.first + format(" %.5g", one.second); });
 }
 
 /// The most that tensors took since reset_peak_memory(), where there are any: "812 MiB", or of a
@@ -39,6 +36,20 @@ std::string peak_of_tensors(Device device) {
   };
   if (device == Device{}) return mebibytes({});
   return mebibytes(device) + " on " + name_of(device) + " and " + mebibytes({}) + " on the host";
+}
+
+/// Which numbers are of Muon's kind depends on the network, so this shows what `kind: muon` does.
+void log_optimisers(const Stage& stage) {
+  const OptimisedNumbers n = stage.optimised();
+  const std::string said = cat(stage.name(), ": Muon moves ", n.muon, " numbers, Adam ", n.adam);
+  if (n.muon > 0) return log_info(said);
+  log_warning(cat(said, "; Muon is for matrices of ", Muon::kLeastSide, " rows and columns"));
+}
+
+/// Ends a training that was asked to stop, after its checkpoint.
+[[noreturn]] void end_stopped() {
+  throw_if_stopped();
+  throw Interrupted(SIGTERM);  // the signal came to another process of the team
 }
 
 /// The training of one stage.
@@ -64,21 +75,19 @@ class StageRun {
     stage_.load(file, checkpoint.path);
     if (average_) average_->load(file, checkpoint.path);
     if (loop_.selection.judges()) best_.load(file, checkpoint.path);
+    unvalidated_ = file.find(kUnvalidated) != nullptr;
     done_ = checkpoint.step;
     resumed_ = true;
   }
 
   /// Trains the stage to its end; then the stage holds the weights that it hands on.
   void run() {
-    const StopScope stop;
     tell([&](TrainObserver& o) { o.on_begin(stage_, done_); });
     if (stage_.steps() == 0) {
-      if (resumed_) return;  // it was judged and saved then
-      log_info(validate());
-      checkpoint();
-      return;
+      if (!resumed_ || unvalidated_) settle(true, true, log_info);
+      return;  // a resumed one was validated and saved then
     }
-    if (!over()) all_steps();
+    if (!over() || unvalidated_) all_steps();
     hand_on();
   }
 
@@ -99,7 +108,11 @@ class StageRun {
 
   void all_steps();
   NamedValues step();
-  std::string validate();
+  using Note = std::function<void(const std::string&)>;
+  void one_step(Progress* progress, int64_t first, const Note& note);
+  void settle(bool validates, bool saves, const Note& note);
+  void validate(const Note& note);
+  std::string judged(NamedValues scores);
   void checkpoint();
   void hand_on();
   std::string keep_failure(const NonFiniteError& error) const;
@@ -116,6 +129,7 @@ class StageRun {
   Throughput throughput_;
   int64_t done_ = 0;
   bool resumed_ = false;
+  bool unvalidated_ = false;  ///< a stop came before the end of the validation that was due
 };
 
 void StageRun::all_steps() {
@@ -128,37 +142,46 @@ void StageRun::all_steps() {
                   static_cast<long long>(count_parameters(stage_)),
                   static_cast<long long>(stage_.steps()),
                   static_cast<long long>(stage_.examples_per_step())));
+  if (stage_.wants_muon()) log_optimisers(stage_);
   Progress progress(stage_.name(), stage_.steps(), standard_progress(options_.quiet), first);
-  if (stage_.started_from_weights() && !resumed_) {
+  const Note note = [&](const std::string& said) { progress.note(said); };
+  try {
     // What the training must beat, and what is handed on if no later validation is better.
-    progress.note(validate());
-    if (loop_.selection.judges()) checkpoint();
-  }
-  while (!over()) {
-    const NamedValues values = step();
-    const bool stopped = options_.team->any(stop_requested());
-    if (due(loop_.log_every)) {
-      run_.metrics(stage_.name(), done_, values);
-      tell([&](TrainObserver& o) { o.on_log(stage_, done_, values); });
-    }
-    NamedValues shown = values;  // the loss first, then speed
-    const NamedValues speed = throughput_.values();
-    shown.insert(shown.begin() + std::min<std::ptrdiff_t>(1, std::ssize(shown)), speed.begin(),
-                 speed.end());
-    progress.update(done_, shown);
-    if (done_ - first == kForecastAfter && stage_.steps() > 10 * done_) progress.note(forecast());
-    tell([&](TrainObserver& o) { o.on_step(stage_, done_, values); });
-    if (due(loop_.validate_every)) progress.note(validate());
-    const bool keeps_best = loop_.selection.judges() && best_.step() == done_;
-    if (due(loop_.checkpoint_every) || stopped || keeps_best || ended_early()) checkpoint();
-    if (stopped) {
-      progress.finish();
-      throw_if_stopped();
-      throw Interrupted(SIGTERM);  // the signal came to another process of the team
-    }
+    if (stage_.started_from_weights() && !resumed_) settle(true, loop_.selection.judges(), note);
+    if (unvalidated_) settle(true, true, note);
+    while (!over()) one_step(&progress, first, note);
+  } catch (const Interrupted&) {
+    progress.finish();
+    throw;
   }
   progress.finish();
-  report(done_ - first, blocks_before, waited_before);
+  if (done_ > first) report(done_ - first, blocks_before, waited_before);
+}
+
+void StageRun::one_step(Progress* progress, int64_t first, const Note& note) {
+  const NamedValues values = step();
+  if (due(loop_.log_every)) {
+    run_.metrics(stage_.name(), done_, values);
+    tell([&](TrainObserver& o) { o.on_log(stage_, done_, values); });
+  }
+  NamedValues shown = values;  // the loss first, then speed
+  const NamedValues speed = throughput_.values();
+  shown.insert(shown.begin() + std::min<std::ptrdiff_t>(1, std::ssize(shown)), speed.begin(),
+               speed.end());
+  progress->update(done_, shown);
+  if (done_ - first == kForecastAfter && stage_.steps() > 10 * done_) note(forecast());
+  tell([&](TrainObserver& o) { o.on_step(stage_, done_, values); });
+  settle(due(loop_.validate_every), due(loop_.checkpoint_every), note);
+}
+
+/// Between two steps: validates and saves what is due. If a stop was asked for, saves in any case
+/// and ends the training.
+void StageRun::settle(bool validates, bool saves, const Note& note) {
+  if (validates) validate(note);
+  const bool stopped = options_.team->any(stop_requested());
+  const bool keeps_best = loop_.selection.judges() && best_.step() == done_;
+  if (saves || stopped || keeps_best || ended_early()) checkpoint();
+  if (stopped) end_stopped();
 }
 
 NamedValues StageRun::step() {
@@ -205,9 +228,20 @@ std::string StageRun::keep_failure(const NonFiniteError& error) const {
   return path;
 }
 
-std::string StageRun::validate() {
+/// A validation that a stop leaves unfinished counts for nothing; the resumed training makes it up.
+void StageRun::validate(const Note& note) {
   if (average_) average_->exchange();
-  NamedValues scores = stage_.validate();
+  std::optional<NamedValues> scores;
+  try {
+    scores = stage_.validate();
+  } catch (const Interrupted&) {
+  }
+  unvalidated_ = !scores;
+  if (scores) note(judged(*scores));
+  if (average_) average_->exchange();
+}
+
+std::string StageRun::judged(NamedValues scores) {
   std::string out = stage_.name() + " after " + std::to_string(done_) + " steps: " + line(scores);
   if (loop_.selection.judges()) {
     best_.add(done_, scores);
@@ -218,7 +252,6 @@ std::string StageRun::validate() {
   if (hands_on_best()) scores.emplace_back("best_step", static_cast<double>(best_.step()));
   run_.metrics(stage_.name(), done_, scores);
   tell([&](TrainObserver& o) { o.on_validation(stage_, done_, scores); });
-  if (average_) average_->exchange();
   return out;
 }
 
@@ -227,6 +260,7 @@ void StageRun::checkpoint() {
   stage_.save(file);
   if (average_) average_->save(&file);
   if (loop_.selection.judges()) best_.save(&file);
+  if (unvalidated_) file.tensors[kUnvalidated] = Tensor::zeros({1});
   const std::string path = run_.save_checkpoint(stage_.name(), done_, safetensors_bytes(file),
                                                 {loop_.keep, loop_.keep_every, best_.step()});
   tell([&](TrainObserver& o) { o.on_checkpoint(stage_, done_, path); });
@@ -265,6 +299,7 @@ void StageRun::report(int64_t steps, int64_t blocks_before, double waited_before
 
 Bundle train(RunDir& run, const std::vector<std::string>& stages, const LoopConfig& loop,
              const MakeStage& make, const TrainOptions& options) {
+  const StopScope stop;
   const auto resumed = run.take_resumed();
   const auto begin =
       resumed ? std::find(stages.begin(), stages.end(), resumed->stage) - stages.begin() : 0;
@@ -282,6 +317,7 @@ Bundle train(RunDir& run, const std::vector<std::string>& stages, const LoopConf
                                           : latest_checkpoint(run.dir(), {stages[i]}).value());
     }
     stage_run.run();
+    if (options.team->any(stop_requested())) end_stopped();
     if (i + 1 < stages.size()) stage_run.tidy();
     result.add(stage->result());
     // The next stage's tensors have other sizes.

@@ -64,7 +64,9 @@ struct TrainOptions {
 using MakeStage = std::function<std::unique_ptr<Stage>(const std::string& name, Bundle* so_far)>;
 
 /// Runs the stages to their ends, going on from the run's checkpoint if it was resumed. Throws
-/// Interrupted after writing a checkpoint when a signal came. Returns the networks of all stages.
+/// Interrupted after writing a checkpoint when a signal came, whether in a step, in a validation
+/// (which the resumed training makes anew) or between two stages. Returns the networks of all
+/// stages.
 Bundle train(RunDir& run, const std::vector<std::string>& stages, const LoopConfig& loop,
              const MakeStage& make, const TrainOptions& options = {});
 

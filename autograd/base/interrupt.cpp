@@ -16,10 +16,11 @@ namespace {
 std::atomic<int> scopes{0};
 std::atomic<int> caught{0};
 std::atomic<bool> asked{false};
-std::atomic<int64_t> caught_at{0};  // milliseconds
+std::atomic<int64_t> caught_at{0};  // milliseconds; 0: no signal has come
 std::atomic<int> wishes{0};         // of hosts
 thread_local HostSignals* host = nullptr;
-static_assert(std::atomic<int>::is_always_lock_free, "used in a signal handler");
+static_assert(std::atomic<int>::is_always_lock_free && std::atomic<int64_t>::is_always_lock_free,
+              "used in a signal handler");
 
 constexpr int64_t kSameRequest = 500;  // milliseconds
 
@@ -30,15 +31,16 @@ int64_t now() {
 }
 
 /// A terminal and a program such as timeout(1) may both send the one signal that somebody asked
-/// for.
+/// for. The time decides which signal is the first, so that every other finds it.
 void on_signal(int signal) {
   if (scopes.load() > 0) {
-    int none = 0;
-    if (caught.compare_exchange_strong(none, signal)) {
-      caught_at = now();
+    const int64_t time = now();
+    int64_t none = 0;
+    if (caught_at.compare_exchange_strong(none, time)) {
+      caught = signal;
       return;
     }
-    if (now() - caught_at.load() < kSameRequest) return;
+    if (time - caught_at.load() < kSameRequest) return;
   }
   remove_temporaries();
   _exit(128 + signal);
@@ -47,6 +49,7 @@ void on_signal(int signal) {
 }  // namespace
 
 void handle_signals() {
+  caught = 0, caught_at = 0;
   struct sigaction action {};
   action.sa_handler = on_signal;
   sigemptyset(&action.sa_mask);
@@ -54,15 +57,16 @@ void handle_signals() {
   sigaction(SIGINT, &action, nullptr);
   sigaction(SIGTERM, &action, nullptr);
   signal(SIGPIPE, SIG_IGN);
+  signal(SIGCHLD, SIG_DFL);  // a caller that ignores it hands that on: nobody would hear of trials
   signal(SIGXFSZ, SIG_IGN);  // a file that may not grow: writing fails, and is cleaned up after
 }
 
-// A signal that an earlier scope answered does not stop this one.
-StopScope::StopScope() {
-  if (scopes.load() == 0) caught = 0, asked = false;
-  ++scopes;
+StopScope::StopScope() { ++scopes; }
+// What was asked ends with the outermost scope. A signal does not, since nobody can know whether
+// the scope has seen it.
+StopScope::~StopScope() {
+  if (--scopes == 0) asked = false;
 }
-StopScope::~StopScope() { --scopes; }
 
 void ask_to_stop() {
   if (scopes.load() > 0) asked = true;

@@ -17,12 +17,14 @@ class Interrupted : public Error {
 };
 
 /// Installs the handlers; writing to a closed pipe becomes an ordinary error instead of a signal.
-/// Called once by the program; a library user may leave it out.
+/// Called once by the program, when it begins. A host program that handles signals itself leaves it
+/// out; who calls it again forgets the signals that came before.
 void handle_signals();
 
 /// While a StopScope exists, the first signal sets the flag and the second signal ends the program.
 /// What comes within half a second of the first belongs to it: a wrapper such as timeout(1) sends
-/// its signal to the program and to the program's group.
+/// its signal to the program and to the program's group. The flag of a signal stays set after the
+/// scope: a program that was told to end does not go on with its next piece of work.
 class StopScope {
  public:
   StopScope();
@@ -32,7 +34,8 @@ class StopScope {
 };
 
 /// Does what a first signal in a StopScope does, for a program that was asked to stop in another
-/// way. If a signal comes as well, it still counts as the first.
+/// way; but what was asked ends with the outermost scope. If a signal comes as well, it still
+/// counts as the first.
 void ask_to_stop();
 
 /// While it exists, stop_requested() in this thread also asks a host program that handles signals
@@ -54,7 +57,7 @@ class HostSignals {
   HostSignals* outer_;
 };
 
-/// True after a signal in a StopScope, ask_to_stop(), or where a host says so.
+/// True after a signal in a StopScope, after ask_to_stop(), or where a host says so.
 bool stop_requested();
 /// Throws Interrupted if stop_requested().
 void throw_if_stopped();

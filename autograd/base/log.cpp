@@ -1,6 +1,7 @@
 #include "autograd/base/log.h"
 
 #include <spdlog/sinks/basic_file_sink.h>
+#include <spdlog/sinks/dist_sink.h>
 #include <spdlog/sinks/stdout_sinks.h>
 #include <spdlog/spdlog.h>
 
@@ -9,15 +10,22 @@
 namespace restage {
 namespace {
 
-spdlog::logger& logger() {
-  static const auto instance = [] {
-    auto console = std::make_shared<spdlog::sinks::stderr_sink_mt>();
+/// The logger with its two sinks, which never change: other threads may be writing.
+struct Log {
+  std::shared_ptr<spdlog::sinks::stderr_sink_mt> console =
+      std::make_shared<spdlog::sinks::stderr_sink_mt>();
+  std::shared_ptr<spdlog::sinks::dist_sink_mt> files =  // none or one; it has a lock of its own
+      std::make_shared<spdlog::sinks::dist_sink_mt>();
+  spdlog::logger logger{"restage", {console, files}};
+  Log() {
     console->set_pattern("%v");
-    auto made = std::make_shared<spdlog::logger>("restage", console);
-    made->flush_on(spdlog::level::info);
-    return made;
-  }();
-  return *instance;
+    logger.flush_on(spdlog::level::info);
+  }
+};
+
+Log& the_log() {
+  static Log instance;
+  return instance;
 }
 
 }  // namespace
@@ -25,20 +33,20 @@ spdlog::logger& logger() {
 void set_log_level(LogLevel level) {
   static constexpr spdlog::level::level_enum levels[] = {spdlog::level::debug, spdlog::level::info,
                                                          spdlog::level::warn, spdlog::level::off};
-  logger().sinks()[0]->set_level(levels[static_cast<int>(level)]);
-  logger().set_level(level == LogLevel::debug ? spdlog::level::debug : spdlog::level::info);
+  the_log().console->set_level(levels[static_cast<int>(level)]);
+  the_log().logger.set_level(level == LogLevel::debug ? spdlog::level::debug : spdlog::level::info);
 }
 
 void set_log_file(const std::string& path) {
-  logger().sinks().resize(1);
+  the_log().files->set_sinks({});
   if (path.empty()) return;
   auto file = std::make_shared<spdlog::sinks::basic_file_sink_mt>(path, false);
   file->set_pattern("%Y-%m-%d %H:%M:%S %v");
-  logger().sinks().push_back(file);
+  the_log().files->add_sink(file);
 }
 
-void log_debug(const std::string& text) { logger().debug("{}", text); }
-void log_info(const std::string& text) { logger().info("{}", text); }
-void log_warning(const std::string& text) { logger().warn("warning: {}", text); }
+void log_debug(const std::string& text) { the_log().logger.debug("{}", text); }
+void log_info(const std::string& text) { the_log().logger.info("{}", text); }
+void log_warning(const std::string& text) { the_log().logger.warn("warning: {}", text); }
 
 }  // namespace restage

@@ -11,6 +11,7 @@
 #include "autograd/cpu/math-inl.h"
 #include "autograd/cpu/philox-inl.h"
 #include "autograd/cpu/targets.h"
+#include "autograd/kernels/binary_values.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace restage::cpu::HWY_NAMESPACE {
@@ -64,41 +65,23 @@ void apply_unary_grad(Unary op, int64_t n, const T* of, const T* gy, T* out, T o
 }
 #undef RESTAGE_CASE
 
-template <class T>
-T combine(Binary op, T a, T b) {
-  switch (op) {
-    case Binary::add:
-      return a + b;
-    case Binary::sub:
-      return a - b;
-    case Binary::mul:
-      return a * b;
-    case Binary::div:
-      return a / b;
-  }
-  return T(0);
-}
-
-template <class T, Binary op>
-void binary_rows(const T* a, const T* b, T* out, const BroadcastPlan& plan) {
+/// out[i] = f(i, number of a, number of b) for all numbers of the result.
+template <class T, class F>
+void combine(const T* a, const T* b, T* out, const BroadcastPlan& plan, const F& f) {
   const int64_t n = plan.inner;
   const auto run = [&](int64_t row, int64_t from, int64_t to) HWY_ATTR {
     int64_t oa = 0, ob = 0;
     plan.offsets(row, &oa, &ob);
-    const T* pa = a + oa;
-    const T* pb = b + ob;
-    T* po = out + row * n;
-    if (plan.inner_a && plan.inner_b) {
-      for (int64_t i = from; i < to; ++i) po[i] = combine<T>(op, pa[i], pb[i]);
+    const T *pa = a + oa, *pb = b + ob;
+    const int64_t first = row * n;
+    if (plan.inner_a == plan.inner_b) {  // neither is repeated, unless n is 1
+      for (int64_t i = from; i < to; ++i) out[first + i] = f(first + i, pa[i], pb[i]);
     } else if (plan.inner_a) {
       const T v = *pb;
-      for (int64_t i = from; i < to; ++i) po[i] = combine<T>(op, pa[i], v);
-    } else if (plan.inner_b) {
-      const T v = *pa;
-      for (int64_t i = from; i < to; ++i) po[i] = combine<T>(op, v, pb[i]);
+      for (int64_t i = from; i < to; ++i) out[first + i] = f(first + i, pa[i], v);
     } else {
-      const T v = combine<T>(op, *pa, *pb);
-      for (int64_t i = from; i < to; ++i) po[i] = v;
+      const T v = *pa;
+      for (int64_t i = from; i < to; ++i) out[first + i] = f(first + i, v, pb[i]);
     }
   };
   if (plan.outer == 1) {
@@ -107,6 +90,42 @@ void binary_rows(const T* a, const T* b, T* out, const BroadcastPlan& plan) {
     parallel_for(plan.outer, row_grain(n), [&](int64_t from, int64_t to) HWY_ATTR {
       for (int64_t row = from; row < to; ++row) run(row, 0, n);
     });
+  }
+}
+
+template <class T>
+void binary_of(const BinaryArgs& args, const BroadcastPlan& plan) {
+  const T *a = args.a.data<T>(), *b = args.b.data<T>();
+  T* out = args.out.data<T>();
+  switch (args.op) {
+#define RESTAGE_CASE(name, ...)                                         \
+  case Binary::name: {                                                  \
+    const auto f = [](int64_t, T x, T y) HWY_ATTR {                     \
+      return binary_values::Row<Binary::name>::template value<T>(x, y); \
+    };                                                                  \
+    return combine(a, b, out, plan, f);                                 \
+  }
+    RESTAGE_BINARY(RESTAGE_CASE)
+#undef RESTAGE_CASE
+  }
+}
+
+template <class T, int input>
+void binary_grad_of(const BinaryGradArgs& args) {
+  const Tensor &a = args.a ? *args.a : args.gy, &b = args.b ? *args.b : args.gy;
+  const BroadcastPlan plan(a.shape(), b.shape(), args.out.shape());
+  const T *pa = a.data<T>(), *pb = b.data<T>(), *g = args.gy.data<T>();
+  T* out = args.out.data<T>();
+  switch (args.op) {
+#define RESTAGE_CASE(name, ...)                                                \
+  case Binary::name: {                                                         \
+    const auto f = [g](int64_t i, T x, T y) HWY_ATTR {                         \
+      return binary_values::Row<Binary::name>::template by<input>(g[i], x, y); \
+    };                                                                         \
+    return combine(pa, pb, out, plan, f);                                      \
+  }
+    RESTAGE_BINARY(RESTAGE_CASE)
+#undef RESTAGE_CASE
   }
 }
 
@@ -146,24 +165,14 @@ void unary_grad(const UnaryGradArgs& args) {
 void binary(const BinaryArgs& args) {
   if (args.out.numel() == 0) return;
   const BroadcastPlan plan(args.a.shape(), args.b.shape(), args.out.shape());
+  dispatch(args.out.dtype(), [&](auto zero) HWY_ATTR { binary_of<decltype(zero)>(args, plan); });
+}
+
+void binary_grad(const BinaryGradArgs& args) {
+  if (args.out.numel() == 0) return;
   dispatch(args.out.dtype(), [&](auto zero) HWY_ATTR {
     using T = decltype(zero);
-    const T *a = args.a.data<T>(), *b = args.b.data<T>();
-    T* out = args.out.data<T>();
-    switch (args.op) {
-      case Binary::add:
-        binary_rows<T, Binary::add>(a, b, out, plan);
-        break;
-      case Binary::sub:
-        binary_rows<T, Binary::sub>(a, b, out, plan);
-        break;
-      case Binary::mul:
-        binary_rows<T, Binary::mul>(a, b, out, plan);
-        break;
-      case Binary::div:
-        binary_rows<T, Binary::div>(a, b, out, plan);
-        break;
-    }
+    args.input == 0 ? binary_grad_of<T, 0>(args) : binary_grad_of<T, 1>(args);
   });
 }
 
@@ -262,6 +271,7 @@ namespace restage::cpu {
 RESTAGE_KERNEL(unary, UnaryArgs)
 RESTAGE_KERNEL(unary_grad, UnaryGradArgs)
 RESTAGE_KERNEL(binary, BinaryArgs)
+RESTAGE_KERNEL(binary_grad, BinaryGradArgs)
 RESTAGE_KERNEL(expand, ExpandArgs)
 RESTAGE_KERNEL(accumulate, AccumulateArgs)
 RESTAGE_KERNEL(dropout, DropoutArgs)

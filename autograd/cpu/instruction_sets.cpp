@@ -1,4 +1,5 @@
 #include "autograd/kernels/instruction_sets.h"
+#include "autograd/base/words.h"
 
 #include <hwy/highway.h>
 
@@ -13,10 +14,7 @@ namespace {
 std::string name_of(int64_t target) {
   if (target == HWY_AVX3) return "avx512";
   if (target == HWY_STATIC_TARGET) return "baseline";
-  std::string name = hwy::TargetName(target);
-  std::transform(name.begin(), name.end(), name.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return name;
+  return lower_case(hwy::TargetName(target));
 }
 
 /// What the processor has, whatever is in use.
@@ -52,9 +50,8 @@ void use_instruction_set(const std::string& name) {
     chosen() = target;
     return;
   }
-  std::string known;
-  for (const std::string& n : instruction_sets()) known += known.empty() ? n : ", " + n;
-  throw InputError("", "no instruction set '" + name + "' here", "choose one of " + known);
+  throw InputError("", "no instruction set '" + name + "' here",
+                   "choose one of " + joined(instruction_sets()));
 }
 
 }  // namespace restage

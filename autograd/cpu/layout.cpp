@@ -23,6 +23,20 @@ void with_numbers(DType type, F&& f) {
   }
 }
 
+void add_blocks(const CopyBlocksArgs& args) {
+  dispatch(args.out.dtype(), [&](auto zero) {
+    using T = decltype(zero);
+    // One long block is cut, too.
+    const int64_t piece = std::min(args.count, kGrain), pieces = (args.count + piece - 1) / piece;
+    parallel_each(args.outer * pieces, row_grain(piece), [&](int64_t k) {
+      const int64_t o = k / pieces, from = k % pieces * piece;
+      const T* x = args.x.data<T>() + o * args.x_stride + args.x_offset;
+      T* out = args.out.data<T>() + o * args.out_stride + args.out_offset;
+      for (int64_t i = from; i < std::min(args.count, from + piece); ++i) out[i] += x[i];
+    });
+  });
+}
+
 }  // namespace
 
 void cast(const CastArgs& args) {
@@ -41,6 +55,7 @@ void copy_blocks(const CopyBlocksArgs& args) {
   const char* x = static_cast<const char*>(args.x.bytes());
   char* out = static_cast<char*>(args.out.bytes());
   if (args.count == 0) return;
+  if (args.add) return add_blocks(args);
   parallel_each(args.outer, row_grain(args.count), [&](int64_t o) {
     std::memcpy(out + (o * args.out_stride + args.out_offset) * width,
                 x + (o * args.x_stride + args.x_offset) * width,

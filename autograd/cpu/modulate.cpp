@@ -153,31 +153,34 @@ void modulate_of(const ModulateArgs& a) {
   });
 }
 
-/// Sums over parts, in order: of all parts into the parameters' gradients, of an item's into the
-/// gradient of its one row.
+/// to[i] = the sum of from[part * step + i] over `parts`, in order, for i < c.
+template <class T, class To>
+void add_parts(const T* from, int64_t parts, int64_t step, int64_t c, const To& to) {
+  constexpr int64_t kColumns = 64;
+  parallel_for(c, kColumns, [&](int64_t first, int64_t last) HWY_ATTR {
+    double sums[kColumns] = {};
+    for (int64_t p = 0; p < parts; ++p)
+      for (int64_t i = first; i < last; ++i)
+        sums[i - first] += static_cast<double>(from[p * step + i]);
+    for (int64_t i = first; i < last; ++i) *to(i) = static_cast<T>(sums[i - first]);
+  });
+}
+
+/// Of all parts into the parameters' gradients, of an item's into the gradient of its one row.
 template <class T>
 void add_up(const ModulateGradArgs& a, int64_t parts, const T* sums, const T* rows) {
   const int64_t n = a.x.size(0), c = a.x.size(2);
-  for (int64_t k = 0; k < static_cast<int64_t>(kSums); ++k) {
-    Tensor& whole = k < 3    ? a.g_scale
-                    : k == 3 ? a.g_scale_bias
-                    : k < 7  ? a.g_shift
-                             : a.g_shift_bias;
-    const bool bias = k % 4 == 3;
-    for (int64_t i = 0; i < c; ++i) {
-      double sum = 0;
-      for (int64_t p = 0; p < n * parts; ++p)
-        sum += static_cast<double>(sums[(p * static_cast<int64_t>(kSums) + k) * c + i]);
-      whole.data<T>()[bias ? i : 3 * i + k % 4] = static_cast<T>(sum);
-    }
-  }
+  Tensor* const gradients[] = {&a.g_scale, &a.g_scale_bias, &a.g_shift, &a.g_shift_bias};
+  const auto width = static_cast<int64_t>(kSums) * c;
+  add_parts(sums, n * parts, width, width, [&](int64_t at) {
+    const int64_t k = at / c, i = at % c;
+    T* to = gradients[k / 4 * 2 + (k % 4 == 3)]->template data<T>();
+    return k % 4 == 3 ? to + i : to + 3 * i + k % 4;
+  });
   if (a.x.size(1) == a.mesh.size(1)) return;
-  for (int64_t k = 0; k < n * c; ++k) {
-    double sum = 0;
-    for (int64_t p = 0; p < parts; ++p)
-      sum += static_cast<double>(rows[(k / c * parts + p) * c + k % c]);
-    a.out.data<T>()[k] = static_cast<T>(sum);
-  }
+  for (int64_t item = 0; item < n; ++item)
+    add_parts(rows + item * parts * c, parts, c, c,
+              [&](int64_t i) { return a.out.data<T>() + item * c + i; });
 }
 
 template <class T>

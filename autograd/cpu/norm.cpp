@@ -17,51 +17,42 @@ namespace {
 
 constexpr int64_t kPart = 512;  // rows per partial sum
 
-/// For one outer block, sums f(row, i) and g(row, i) over the rows into two double vectors, in
-/// parts that depend on sizes only.
-template <class F>
-void two_sums(int64_t n, int64_t inner, double* a, double* b, bool parallel, F&& add_row) {
-  const int64_t parts = std::max<int64_t>(1, (n + kPart - 1) / kPart);
-  Scratch<double> partial(static_cast<size_t>(2 * parts * inner), 0.0);
-  const auto part = [&](int64_t p) HWY_ATTR {
-    double* pa = partial.data() + 2 * p * inner;
-    for (int64_t r = p * kPart; r < std::min(n, (p + 1) * kPart); ++r) add_row(r, pa, pa + inner);
-  };
-  if (parallel) {
-    parallel_for(parts, 1, [&](int64_t from, int64_t to) HWY_ATTR {
-      for (int64_t p = from; p < to; ++p) part(p);
+/// x [outer, n, inner], whose columns are normalised over n. Work is cut into blocks and, within
+/// these, into parts of rows, so any number of threads has some.
+struct Columns {
+  int64_t outer, n, inner;
+  int64_t parts = std::max<int64_t>(1, (n + kPart - 1) / kPart);
+
+  /// f(row, block, part) for all rows of x; parts are numbered through.
+  template <class F>
+  void each_row(const F& f) const {
+    const int64_t grain = row_grain(std::min(n, kPart) * inner);
+    parallel_for(outer * parts, grain, [&](int64_t from, int64_t to) HWY_ATTR {
+      for (int64_t part = from; part < to; ++part) {
+        const int64_t block = part / parts, first = part % parts * kPart;
+        for (int64_t r = first; r < std::min(n, first + kPart); ++r) f(block * n + r, block, part);
+      }
     });
-  } else {
-    for (int64_t p = 0; p < parts; ++p) part(p);
   }
-  for (int64_t i = 0; i < inner; ++i) {
-    a[i] = b[i] = 0;
-    for (int64_t p = 0; p < parts; ++p) {
-      a[i] += partial[2 * p * inner + i];
-      b[i] += partial[(2 * p + 1) * inner + i];
-    }
-  }
-}
 
-/// Runs f(o) over outer blocks: in parallel over blocks if there are several, else inside.
-template <class F>
-void for_blocks(int64_t outer, int64_t size, F&& f) {
-  if (outer == 1) return f(0, true);
-  parallel_for(outer, row_grain(size), [&](int64_t from, int64_t to) HWY_ATTR {
-    for (int64_t o = from; o < to; ++o) f(o, false);
-  });
-}
-
-template <class F>
-void for_block_rows(int64_t n, int64_t inner, bool parallel, F&& f) {
-  if (!parallel) {
-    for (int64_t r = 0; r < n; ++r) f(r);
-    return;
+  /// [outer, Count, inner]: sums over the rows of each block, in an order that sizes decide.
+  /// add(row, block, sums) adds one row.
+  template <int64_t Count, class F>
+  Scratch<double> sums(const F& add) const {
+    const int64_t width = Count * inner;
+    Scratch<double> of_parts(static_cast<size_t>(outer * parts * width), 0.0),
+        of_blocks(static_cast<size_t>(outer * width), 0.0);
+    double *partial = of_parts.data(), *total = of_blocks.data();
+    each_row([&](int64_t row, int64_t block, int64_t part)
+                 HWY_ATTR { add(row, block, partial + part * width); });
+    parallel_for(outer, row_grain(parts * width), [&](int64_t from, int64_t to) HWY_ATTR {
+      for (int64_t part = from * parts; part < to * parts; ++part)
+        for (int64_t i = 0; i < width; ++i)
+          total[part / parts * width + i] += partial[part * width + i];
+    });
+    return of_blocks;
   }
-  parallel_for(n, row_grain(inner), [&](int64_t from, int64_t to) HWY_ATTR {
-    for (int64_t r = from; r < to; ++r) f(r);
-  });
-}
+};
 
 /// A parameter along the inner axis as doubles, or `none` where there is no such parameter.
 template <class T>
@@ -74,74 +65,70 @@ Scratch<double> along_inner(const Tensor* t, Affine affine, int64_t inner, doubl
 
 template <class T>
 void norm_columns(const NormArgs& args) {
-  const int64_t n = args.n, inner = args.inner;
+  const Columns c{args.outer, args.n, args.inner};
+  const int64_t inner = c.inner;
   const Scratch<double> scale = along_inner<T>(args.scale, args.affine, inner, 1);
   const Scratch<double> shift = along_inner<T>(args.shift, args.affine, inner, 0);
-  for_blocks(args.outer, n * inner, [&](int64_t o, bool parallel) HWY_ATTR {
-    const T* x = args.x.data<T>() + o * n * inner;
-    T* out = args.out.data<T>() + o * n * inner;
-    double* mean = args.mean.data<double>() + o * inner;
-    double* rstd = args.rstd.data<double>() + o * inner;
-    Scratch<double> sums(static_cast<size_t>(inner)), unused(sums);
-    two_sums(n, inner, sums.data(), unused.data(), parallel,
-             [&](int64_t r, double* a, double*) HWY_ATTR {
-               for (int64_t i = 0; i < inner; ++i) a[i] += static_cast<double>(x[r * inner + i]);
-             });
-    for (int64_t i = 0; i < inner; ++i) mean[i] = sums[i] / static_cast<double>(n);
-    two_sums(n, inner, sums.data(), unused.data(), parallel,
-             [&](int64_t r, double* a, double*) HWY_ATTR {
-               for (int64_t i = 0; i < inner; ++i) {
-                 const double d = static_cast<double>(x[r * inner + i]) - mean[i];
-                 a[i] += d * d;
-               }
-             });
+  const T* x = args.x.data<T>();
+  T* out = args.out.data<T>();
+  double *mean = args.mean.data<double>(), *rstd = args.rstd.data<double>();
+  const Scratch<double> sums = c.sums<1>([&](int64_t row, int64_t, double* a) HWY_ATTR {
+    for (int64_t i = 0; i < inner; ++i) a[i] += static_cast<double>(x[row * inner + i]);
+  });
+  const auto count = static_cast<double>(c.n);
+  for (int64_t k = 0; k < c.outer * inner; ++k) mean[k] = sums[k] / count;
+  const Scratch<double> squares = c.sums<1>([&](int64_t row, int64_t block, double* a) HWY_ATTR {
+    const double* m = mean + block * inner;
+    for (int64_t i = 0; i < inner; ++i) {
+      const double d = static_cast<double>(x[row * inner + i]) - m[i];
+      a[i] += d * d;
+    }
+  });
+  for (int64_t k = 0; k < c.outer * inner; ++k)
+    rstd[k] = 1.0 / std::sqrt(squares[k] / count + args.eps);
+  const double *sc = scale.data(), *sh = shift.data();
+  c.each_row([&](int64_t row, int64_t block, int64_t) HWY_ATTR {
+    const double *m = mean + block * inner, *r = rstd + block * inner;
     for (int64_t i = 0; i < inner; ++i)
-      rstd[i] = 1.0 / std::sqrt(sums[i] / static_cast<double>(n) + args.eps);
-    const double *sc = scale.data(), *sh = shift.data();
-    for_block_rows(n, inner, parallel, [&](int64_t r) HWY_ATTR {
-      for (int64_t i = 0; i < inner; ++i)
-        out[r * inner + i] = static_cast<T>(
-            (static_cast<double>(x[r * inner + i]) - mean[i]) * rstd[i] * sc[i] + sh[i]);
-    });
+      out[row * inner + i] =
+          static_cast<T>((static_cast<double>(x[row * inner + i]) - m[i]) * r[i] * sc[i] + sh[i]);
   });
 }
 
 template <class T>
 void norm_columns_grad(const NormGradArgs& args) {
-  const int64_t n = args.n, inner = args.inner;
+  const Columns c{args.outer, args.n, args.inner};
+  const int64_t inner = c.inner;
   const Scratch<double> scale = along_inner<T>(args.scale, args.affine, inner, 1);
   const double* sc = scale.data();
-  for_blocks(args.outer, n * inner, [&](int64_t o, bool parallel) HWY_ATTR {
-    const T* x = args.x.data<T>() + o * n * inner;
-    const T* gy = args.gy.data<T>() + o * n * inner;
-    const double* mean = args.mean.data<double>() + o * inner;
-    const double* rstd = args.rstd.data<double>() + o * inner;
-    T* out = args.out.data<T>() + o * n * inner;
-    // Sums of the output's gradient, and of it times the normalised input, per column.
-    Scratch<double> sg(static_cast<size_t>(inner)), sgx(sg);
-    two_sums(n, inner, sg.data(), sgx.data(), parallel,
-             [&](int64_t r, double* a, double* b) HWY_ATTR {
-               for (int64_t i = 0; i < inner; ++i) {
-                 const double g = static_cast<double>(gy[r * inner + i]);
-                 a[i] += g;
-                 b[i] += g * (static_cast<double>(x[r * inner + i]) - mean[i]) * rstd[i];
-               }
-             });
-    const double inv = 1.0 / static_cast<double>(n);
-    const double *pg = sg.data(), *pgx = sgx.data();
-    for_block_rows(n, inner, parallel, [&](int64_t r) HWY_ATTR {
-      for (int64_t i = 0; i < inner; ++i) {
-        const double h = (static_cast<double>(x[r * inner + i]) - mean[i]) * rstd[i];
-        const double g = static_cast<double>(gy[r * inner + i]);
-        out[r * inner + i] = static_cast<T>(sc[i] * rstd[i] * (g - inv * (pg[i] + h * pgx[i])));
-      }
-    });
-    if (args.g_scale == nullptr) return;  // only ever with one block: batch norm
+  const T *x = args.x.data<T>(), *gy = args.gy.data<T>();
+  T* out = args.out.data<T>();
+  const double *mean = args.mean.data<double>(), *rstd = args.rstd.data<double>();
+  // Per column the sum of the output's gradient, then of it times the normalised input.
+  const Scratch<double> sums = c.sums<2>([&](int64_t row, int64_t block, double* a) HWY_ATTR {
+    const double *m = mean + block * inner, *s = rstd + block * inner;
+    double* b = a + inner;
     for (int64_t i = 0; i < inner; ++i) {
-      args.g_scale->data<T>()[i] = static_cast<T>(pgx[i]);
-      args.g_shift->data<T>()[i] = static_cast<T>(pg[i]);
+      const double g = static_cast<double>(gy[row * inner + i]);
+      a[i] += g;
+      b[i] += g * (static_cast<double>(x[row * inner + i]) - m[i]) * s[i];
     }
   });
+  const double inv = 1.0 / static_cast<double>(c.n);
+  c.each_row([&](int64_t row, int64_t block, int64_t) HWY_ATTR {
+    const double *m = mean + block * inner, *s = rstd + block * inner;
+    const double *sg = sums.data() + block * 2 * inner, *sgx = sg + inner;
+    for (int64_t i = 0; i < inner; ++i) {
+      const double h = (static_cast<double>(x[row * inner + i]) - m[i]) * s[i];
+      const double g = static_cast<double>(gy[row * inner + i]);
+      out[row * inner + i] = static_cast<T>(sc[i] * s[i] * (g - inv * (sg[i] + h * sgx[i])));
+    }
+  });
+  if (args.g_scale == nullptr) return;  // only ever with one block: batch norm
+  for (int64_t i = 0; i < inner; ++i) {
+    args.g_shift->data<T>()[i] = static_cast<T>(sums[i]);
+    args.g_scale->data<T>()[i] = static_cast<T>(sums[inner + i]);
+  }
 }
 
 /// Layer norm: every row by itself, scale and shift along the row. Rows are short, so their sums

@@ -1,6 +1,4 @@
 // Conversions of rotations, row by row: scalar geometry, baseline code.
-#include <cmath>
-
 #include "autograd/base/parallel_each.h"
 #include "autograd/cpu/common.h"
 #include "autograd/cpu/kernels.h"
@@ -70,32 +68,6 @@ void from_matrix(const FromMatrixArgs& args) {
       } else {
         to_axis_angle(x, out);
       }
-    });
-  });
-}
-
-void atan2(const Atan2Args& args) {
-  dispatch(args.out.dtype(), [&](auto zero) {
-    using T = decltype(zero);
-    const T *y = args.y.data<T>(), *x = args.x.data<T>();
-    T* out = args.out.data<T>();
-    parallel_each(args.out.numel(), 512, [&](int64_t i) {
-      out[i] = static_cast<T>(std::atan2(static_cast<double>(y[i]), static_cast<double>(x[i])));
-    });
-  });
-}
-
-void atan2_grad(const Atan2GradArgs& args) {
-  constexpr double least = 1e-12;  // squared
-  dispatch(args.out.dtype(), [&](auto zero) {
-    using T = decltype(zero);
-    const T *y = args.y.data<T>(), *x = args.x.data<T>(), *g = args.gy.data<T>();
-    T *g_y = args.out.data<T>(), *g_x = args.g_x.data<T>();
-    parallel_each(args.out.numel(), 512, [&](int64_t i) {
-      const double a = y[i], b = x[i], square = a * a + b * b;
-      const double factor = square <= least ? 0 : g[i] / square;  // NaN stays NaN
-      g_y[i] = static_cast<T>(factor * b);
-      g_x[i] = static_cast<T>(-factor * a);
     });
   });
 }

@@ -2,6 +2,7 @@
 // the same for all threads, costs nothing.
 #include "autograd/cuda/kernels.h"
 #include "autograd/cuda/philox.h"
+#include "autograd/kernels/binary_values.h"
 
 namespace restage::cuda {
 namespace {
@@ -104,28 +105,56 @@ void unary_grad_of(const UnaryGradArgs& args) {
   });
 }
 
+/// f(x, y), or the gradient of one of its numbers from g = dL/df: `input` 0 or 1.
 template <class T>
-RESTAGE_DEVICE T value_of(Binary op, T x, T y) {
-  return op == Binary::add ? x + y : op == Binary::sub ? x - y : op == Binary::mul ? x * y : x / y;
+RESTAGE_DEVICE T value_or_gradient(Binary op, int input, T g, T x, T y) {
+  switch (op) {
+#define RESTAGE_CASE(name, ...)                          \
+  case Binary::name: {                                   \
+    using Row = binary_values::Row<Binary::name>;        \
+    if (input == 0) return Row::template by<0>(g, x, y); \
+    if (input == 1) return Row::template by<1>(g, x, y); \
+    return Row::value(x, y);                             \
+  }
+    RESTAGE_BINARY(RESTAGE_CASE)
+#undef RESTAGE_CASE
+  }
+  return g;
 }
 
-/// Most operands have the result's shape, or one number for each of its last axis.
+/// Most operands have the result's shape, or one number for each of its last axis. g is read for
+/// gradients alone.
+template <class T>
+void combine(Binary op, int input, const Tensor& of_a, const Tensor& of_b, const T* g, Tensor& to) {
+  const T *a = at<T>(of_a), *b = at<T>(of_b);
+  T* out = at<T>(to);
+  const int64_t n = to.numel();
+  if (n == 0) return;
+  if (of_a.numel() == n && of_b.numel() == n)
+    return each(n, [=] RESTAGE_DEVICE(int64_t i) {
+      out[i] = value_or_gradient(op, input, g == nullptr ? T(0) : g[i], a[i], b[i]);
+    });
+  const int64_t width = to.rank() > 0 ? to.size(-1) : 1;
+  if (of_a.numel() == n && of_b.numel() == width && of_b.size(-1) == width)
+    return rows(n / width, width, [=] RESTAGE_DEVICE(int64_t row, int64_t c) {
+      const int64_t i = row * width + c;
+      out[i] = value_or_gradient(op, input, g == nullptr ? T(0) : g[i], a[i], b[c]);
+    });
+  const Steps at_a(of_a.shape(), to.shape()), at_b(of_b.shape(), to.shape());
+  each(n, [=] RESTAGE_DEVICE(int64_t i) {
+    const T x = a[at_a.at(i)], y = b[at_b.at(i)];
+    out[i] = value_or_gradient(op, input, g == nullptr ? T(0) : g[i], x, y);
+  });
+}
+
 template <class T>
 void binary_of(const BinaryArgs& args) {
-  const T *a = at<T>(args.a), *b = at<T>(args.b);
-  T* out = at<T>(args.out);
-  const Binary op = args.op;
-  const int64_t n = args.out.numel();
-  if (n == 0) return;
-  if (args.a.numel() == n && args.b.numel() == n)
-    return each(n, [=] RESTAGE_DEVICE(int64_t i) { out[i] = value_of(op, a[i], b[i]); });
-  const int64_t width = args.out.rank() > 0 ? args.out.size(-1) : 1;
-  if (args.a.numel() == n && args.b.numel() == width && args.b.size(-1) == width)
-    return rows(n / width, width, [=] RESTAGE_DEVICE(int64_t row, int64_t c) {
-      out[row * width + c] = value_of(op, a[row * width + c], b[c]);
-    });
-  const Steps of_a(args.a.shape(), args.out.shape()), of_b(args.b.shape(), args.out.shape());
-  each(n, [=] RESTAGE_DEVICE(int64_t i) { out[i] = value_of(op, a[of_a.at(i)], b[of_b.at(i)]); });
+  combine<T>(args.op, -1, args.a, args.b, nullptr, args.out);
+}
+template <class T>
+void binary_grad_of(const BinaryGradArgs& args) {
+  combine<T>(args.op, args.input, args.a ? *args.a : args.gy, args.b ? *args.b : args.gy,
+             at<T>(args.gy), args.out);
 }
 
 template <class T>
@@ -208,6 +237,9 @@ void cast_from(const CastArgs& args) {
 void unary(const UnaryArgs& args) { RESTAGE_FLOATS(args.out.dtype(), unary_of, args) }
 void unary_grad(const UnaryGradArgs& args) { RESTAGE_FLOATS(args.out.dtype(), unary_grad_of, args) }
 void binary(const BinaryArgs& args) { RESTAGE_FLOATS(args.out.dtype(), binary_of, args) }
+void binary_grad(const BinaryGradArgs& args) {
+  RESTAGE_FLOATS(args.out.dtype(), binary_grad_of, args)
+}
 void accumulate(const AccumulateArgs& args) {
   RESTAGE_FLOATS(args.out.dtype(), accumulate_of, args)
 }

@@ -11,9 +11,12 @@ void copy_blocks_of(const CopyBlocksArgs& args) {
   T* out = at<T>(args.out);
   const int64_t count = args.count, xs = args.x_stride, xo = args.x_offset, os = args.out_stride,
                 oo = args.out_offset;
+  const bool add = args.add;
   each(args.outer * count, [=] RESTAGE_DEVICE(int64_t k) {
     const int64_t o = k / count, i = k % count;
-    out[o * os + oo + i] = x[o * xs + xo + i];
+    const T value = x[o * xs + xo + i];
+    T& to = out[o * os + oo + i];
+    to = add ? to + value : value;
   });
 }
 

@@ -55,27 +55,6 @@ void from_matrix_of(const FromMatrixArgs& args) {
   });
 }
 
-template <class T>
-void atan2_of(const Atan2Args& args) {
-  const T *y = at<T>(args.y), *x = at<T>(args.x);
-  T* out = at<T>(args.out);
-  each(args.out.numel(), [=] RESTAGE_DEVICE(int64_t i) {
-    out[i] = static_cast<T>(::atan2(static_cast<double>(y[i]), static_cast<double>(x[i])));
-  });
-}
-
-template <class T>
-void atan2_grad_of(const Atan2GradArgs& args) {
-  const T *y = at<T>(args.y), *x = at<T>(args.x), *g = at<T>(args.gy);
-  T *g_y = at<T>(args.out), *g_x = at<T>(args.g_x);
-  each(args.out.numel(), [=] RESTAGE_DEVICE(int64_t i) {
-    const double a = y[i], b = x[i], square = a * a + b * b;
-    const double factor = square <= 1e-12 ? 0 : g[i] / square;  // NaN stays NaN
-    g_y[i] = static_cast<T>(factor * b);
-    g_x[i] = static_cast<T>(-factor * a);
-  });
-}
-
 }  // namespace
 
 void to_matrix(const ToMatrixArgs& args) { RESTAGE_FLOATS(args.out.dtype(), to_matrix_of, args) }
@@ -85,7 +64,5 @@ void to_matrix_grad(const ToMatrixGradArgs& args) {
 void from_matrix(const FromMatrixArgs& args) {
   RESTAGE_FLOATS(args.out.dtype(), from_matrix_of, args)
 }
-void atan2(const Atan2Args& args) { RESTAGE_FLOATS(args.out.dtype(), atan2_of, args) }
-void atan2_grad(const Atan2GradArgs& args) { RESTAGE_FLOATS(args.out.dtype(), atan2_grad_of, args) }
 
 }  // namespace restage::cuda

@@ -7,6 +7,7 @@
 //   Report r = check(swish);   // r.failures says what is wrong, r.compared how much was compared
 #pragma once
 
+#include <deque>
 #include <functional>
 #include <string>
 #include <utility>
@@ -97,8 +98,8 @@ Report check_sample(const OpSamples& op, const Sample& sample);
 Report check(const OpSamples& op, int random_cases = 12, Device device = {});
 
 /// Samples of every op of autograd/ops and of the functions composed of them (conv1d, mse, ...),
-/// and of those that were registered.
-const std::vector<OpSamples>& all_samples();
+/// and of those that were registered. Those that are there stay where they are when more come.
+const std::deque<OpSamples>& all_samples();
 /// Adds the samples of an op of a program that uses this library, before all_samples() is asked
 /// for. Using an op needs no registration (call(), autograd/tape/tape.h). Error if an op of that
 /// name has samples already.

@@ -1,11 +1,13 @@
 #include "autograd/gradcheck/samples.h"
 
+#include "autograd/base/registry.h"
+
 namespace restage::gradcheck {
 
 namespace {
 
-Table& known() {
-  static Table table = [] {
+Registry<OpSamples, &OpSamples::op>& known() {
+  static Registry<OpSamples, &OpSamples::op> all("op", [] {
     Table t;
     add_attention(t);
     add_cross_attention(t);
@@ -21,19 +23,15 @@ Table& known() {
     add_rotation(t);
     add_swing(t);
     return t;
-  }();
-  return table;
+  }());
+  return all;
 }
 
 }  // namespace
 
-const std::vector<OpSamples>& all_samples() { return known(); }
+const Table& all_samples() { return known().all(); }
 
-void register_op(OpSamples samples) {
-  for (const OpSamples& op : known())
-    if (op.op == samples.op) throw Error("there are samples of an op '" + op.op + "' already");
-  known().push_back(std::move(samples));
-}
+void register_op(OpSamples samples) { known().add(std::move(samples)); }
 
 int64_t random_size(Rng& rng, int64_t least, int64_t most) {
   return least + static_cast<int64_t>(rng.below(static_cast<uint64_t>(most - least + 1)));

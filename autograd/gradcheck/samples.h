@@ -5,7 +5,7 @@
 
 namespace restage::gradcheck {
 
-using Table = std::vector<OpSamples>;
+using Table = std::deque<OpSamples>;
 
 void add_attention(Table& table);
 void add_cross_attention(Table& table);

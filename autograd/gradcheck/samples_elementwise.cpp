@@ -47,12 +47,24 @@ OpSamples unary(Domain domain, double number = 0) {
   return s;
 }
 
+/// The nearest multiples of 1/64, moved by `offset`.
+Tensor on_grid(Tensor t, double offset) {
+  for (int64_t i = 0; i < t.numel(); ++i)
+    t.data<double>()[i] = std::round(64 * t.item(i)) / 64 + offset;
+  return t;
+}
+
 template <Binary B>
-OpSamples binary() {
+OpSamples binary(Domain domain) {
   OpSamples s = samples_for<BinaryOp<B>>();
   const Build build = [](Args x) { return call(BinaryOp<B>{}, {x[0], x[1]}); };
+  Rng rng(RngKey{31, 0});
+  const auto numbers = [domain](const Shape& shape, Rng& from) {  // the first ones
+    return domain == Domain::all ? random(shape, from, 0.5) : in_domain(shape, from, domain);
+  };
+  const auto first = [&](const Shape& shape) { return numbers(shape, rng); };
   const auto pair = [&](const Shape& a, const Shape& b) {
-    s.add(a.str() + " " + b.str(), {random(a, 31, 0.5), random(b, 32, 0.5)}, build);
+    s.add(a.str() + " " + b.str(), {first(a), random(b, rng, 0.5)}, build);
   };
   pair({3, 4}, {3, 4});
   pair({3, 1}, {1, 4});
@@ -66,21 +78,25 @@ OpSamples binary() {
   pair({0, 3}, {3});
   pair({0, 3}, {1, 1});
   pair({1, 0}, {4, 1});
-  s.large("many rows", {random({700, 73}, 33, 0.5), random({73}, 34, 0.5)}, build);
+  // So many pairs, and none within a difference's step of equal numbers, where minima have a kink.
+  s.large("many rows", {on_grid(first({700, 73}), 1.0 / 128), on_grid(random({73}, rng, 0.5), 0)},
+          build);
   s.error("sizes 3 and 4", {random({2, 3}, 1), random({2, 4}, 1)}, build);
   s.error("sizes 0 and 2", {random({0}, 1), random({2}, 1)}, build);
   s.error("two dtypes", {random({2}, 1), random({2}, 1).cast(DType::f32)}, build);
-  s.random = [build](Rng& rng) {
-    const Shape out = random_shape(rng, 1, 4);
+  s.error("integers", {i32({1}, {1}), i32({1}, {1})}, build);
+  s.random = [build, numbers](Rng& r) {
+    const Shape out = random_shape(r, 1, 4);
     const auto part = [&] {  // drops leading axes, sets others to 1
       Shape shape;
-      for (int i = static_cast<int>(rng.below(static_cast<uint64_t>(out.rank()))); i < out.rank();
+      for (int i = static_cast<int>(r.below(static_cast<uint64_t>(out.rank()))); i < out.rank();
            ++i)
-        shape.push_back(rng.below(3) == 0 ? 1 : out[i]);
+        shape.push_back(r.below(3) == 0 ? 1 : out[i]);
       return shape;
     };
     const Shape a = part(), b = part();
-    return Sample{"", {random(a, rng, 0.5), random(b, rng, 0.5)}, build};
+    Tensor x = numbers(a, r);
+    return Sample{"", {x, random(b, r, 0.5)}, build};
   };
   return s;
 }
@@ -160,10 +176,26 @@ void add_elementwise(Table& t) {
   const Tensor far = f64({4}, {-700, -30, 30, 700});
   of("sigmoid").add("far out", {far}, [](Args x) { return sigmoid(x[0]); });
   of("softplus").add("far out", {far}, [](Args x) { return softplus(x[0]); });
-  t.push_back(binary<Binary::add>());
-  t.push_back(binary<Binary::sub>());
-  t.push_back(binary<Binary::mul>());
-  t.push_back(binary<Binary::div>());
+#define RESTAGE_SAMPLES(name, a, b, help, domain, ...) \
+  t.push_back(binary<Binary::name>(Domain::domain));
+  RESTAGE_BINARY(RESTAGE_SAMPLES)
+#undef RESTAGE_SAMPLES
+  const Tensor ones = f64({2}, {3, -3}), zeros = f64({2}, {0, 0}), full = f64({2}, {1, 1});
+  of("minimum").kink("of equal ones", {ones, ones.clone()},
+                     [](Args x) { return minimum(x[0], x[1]); }, {full, zeros});
+  of("maximum").kink("of equal ones", {ones, ones.clone()},
+                     [](Args x) { return maximum(x[0], x[1]); }, {full, zeros});
+  of("pow").kink("of no positive number", {f64({2}, {0, -2}), f64({2}, {2, 3})},
+                 [](Args x) { return pow(x[0], x[1]); }, {f64({2}, {0, 12}), zeros});
+  const Build angle = [](Args x) { return atan2(x[0], x[1]); };
+  of("atan2").add("all quadrants and axes",
+                  {f64({7}, {1, 2, -1, -3, 1, -1, 0}), f64({7}, {2, -1, -3, 1, 0, 0, 2})}, angle);
+  of("atan2").add("far and near", {f64({3}, {300, 1e-2, -2e-2}), f64({3}, {-50, 2e-2, 1e-2})},
+                  angle);
+  const Tensor none = f64({4}, {0, 0, 0, 0});
+  of("atan2").kink("at the origin both derivatives are 0",
+                   {f64({4}, {0.0, -0.0, 0.0, 1e-7}), f64({4}, {0.0, 0.0, -0.0, -1e-7})}, angle,
+                   {none, none});
   t.push_back(expand_samples());
   t.push_back(dropout_samples());
 }

@@ -1,4 +1,7 @@
+#include <set>
+
 #include "autograd/gradcheck/samples.h"
+#include "autograd/ops/elementwise.h"
 #include "autograd/ops/layout.h"
 
 namespace restage::gradcheck {
@@ -79,6 +82,45 @@ OpSamples slice_samples() {
     Sample sample{"", {random(shape, rng)}, part(axis, from, to)};
     sample.zero_gradient = from == to && shape.numel() > 0;
     return sample;
+  };
+  return s;
+}
+
+OpSamples split_samples() {
+  OpSamples s = samples_for<Split>();
+  /// The parts, each times another number and without those in `unused`, in reverse order.
+  const auto parts = [](int axis, const std::vector<int64_t>& sizes, std::set<size_t> unused = {}) {
+    return Build([=](Args x) {
+      Split op{axis, {}};
+      for (const int64_t size : sizes) op.sizes.push_back(size);
+      const Vars y = call(op, {x[0]});
+      std::vector<Var> used;
+      for (size_t i = y.size(); i-- > 0;)
+        if (!unused.contains(i)) used.push_back(scale(y[i], static_cast<double>(i + 1)));
+      return concat(std::span<const Var>(used), axis);
+    });
+  };
+  s.add("middle axis", {random({2, 6, 3}, 1)}, parts(1, {1, 3, 2}));
+  s.add("last axis", {random({2, 5}, 2)}, parts(-1, {4, 1}));
+  s.add("one part of [1]", {random({1}, 3)}, parts(0, {1}));
+  s.add("an empty part", {random({3, 2}, 4)}, parts(0, {2, 0, 1}));
+  s.add("a part that nobody uses", {random({2, 6}, 5)}, parts(1, {1, 2, 3}, {1}));
+  s.add("the first part alone", {random({2, 6}, 5)}, parts(1, {1, 2, 3}, {1, 2}));
+  s.add("[0, 4]", {random({0, 4}, 6)}, parts(1, {1, 3}));
+  s.large("many", {random({kRows, kCols}, 7)}, parts(1, {3, kCols - 10, 7}));
+  s.error("too little", {random({2, 3}, 1)}, parts(1, {1, 1}));
+  s.error("too much", {random({2, 3}, 1)}, parts(1, {2, 2}));
+  s.error("a negative size", {random({2, 3}, 1)}, parts(1, {4, -1}));
+  s.error("no parts", {random({2, 0}, 1)}, parts(1, {}));
+  s.error("no such axis", {random({2, 3}, 1)}, parts(2, {1}));
+  s.random = [parts](Rng& rng) {
+    const Shape shape = random_shape(rng, 1, 4);
+    const int axis = static_cast<int>(rng.below(static_cast<uint64_t>(shape.rank())));
+    std::vector<int64_t> sizes;
+    int64_t left = shape[axis];
+    for (int i = 0; i < 3; ++i) left -= sizes.emplace_back(random_size(rng, 0, left));
+    sizes.push_back(left);
+    return Sample{"", {random(shape, rng)}, parts(axis, sizes)};
   };
   return s;
 }
@@ -224,6 +266,7 @@ void add_layout(Table& t) {
   t.push_back(reshape_samples());
   t.push_back(permute_samples());
   t.push_back(slice_samples());
+  t.push_back(split_samples());
   t.push_back(concat_samples());
   t.push_back(gather_samples());
   t.push_back(scatter_samples());

@@ -43,33 +43,6 @@ OpSamples to_matrix_samples() {
   return s;
 }
 
-/// Inputs y and x, off the cut along the negative x axis, where the angle jumps.
-std::vector<Tensor> directions(const Shape& shape, Rng& rng) {
-  return {random(shape, rng, 0.2), random(shape, rng, 0.2)};
-}
-
-OpSamples atan2_samples() {
-  OpSamples s = samples_for<Atan2>();
-  const Build build = [](Args x) { return atan2(x[0], x[1]); };
-  Rng rng(RngKey{28, 0});
-  s.add("[3, 4]", directions({3, 4}, rng), build);
-  s.add("[1]", directions({1}, rng), build);
-  s.add("without axes", directions({}, rng), build);
-  s.add("[2, 0]", directions({2, 0}, rng), build);
-  s.add("all quadrants and axes",
-        {f64({7}, {1, 2, -1, -3, 1, -1, 0}), f64({7}, {2, -1, -3, 1, 0, 0, 2})}, build);
-  s.add("far and near", {f64({3}, {300, 1e-2, -2e-2}), f64({3}, {-50, 2e-2, 1e-2})}, build);
-  s.large("many", directions({4001}, rng), build);
-  const Tensor none = f64({4}, {0.0, -0.0, 0.0, 1e-7}), zero = f64({4}, {0, 0, 0, 0});
-  s.kink("at the origin both derivatives are 0", {none, f64({4}, {0.0, 0.0, -0.0, -1e-7})}, build,
-         {zero, zero});
-  s.error("shapes differ", {random({2, 3}, 1), random({3}, 1)}, build);
-  s.error("two dtypes", {random({2}, 1), random({2}, 1).cast(DType::f32)}, build);
-  s.error("integers", {i32({1}, {1}), i32({1}, {1})}, build);
-  s.random = [build](Rng& r) { return Sample{"", directions(random_shape(r, 0, 3), r), build}; };
-  return s;
-}
-
 std::vector<Tensor> fk_inputs(int64_t n, int64_t j, Rng& rng) {
   return {random({n, j, 3, 3}, rng), random({n, j, 3}, rng), random({n, 3}, rng)};
 }
@@ -172,7 +145,6 @@ OpSamples sixd_samples() {
 
 void add_rotation(Table& t) {
   t.push_back(to_matrix_samples());
-  t.push_back(atan2_samples());
   t.push_back(fk_samples());
   t.push_back(lbs_samples());
   t.push_back(sixd_samples());

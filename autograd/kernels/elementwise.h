@@ -2,6 +2,7 @@
 #pragma once
 
 #include "autograd/base/rng.h"
+#include "autograd/kernels/binary_rows.h"
 #include "autograd/kernels/kernel.h"
 #include "autograd/kernels/unary_rows.h"
 
@@ -44,12 +45,42 @@ struct UnaryGradArgs {
   double number = 0;
 };
 
-enum class Binary { add, sub, mul, div };
+enum class Binary {
+#define RESTAGE_NAME(name, ...) name,
+  RESTAGE_BINARY(RESTAGE_NAME)
+#undef RESTAGE_NAME
+};
+#define RESTAGE_ONE(...) +1
+inline constexpr int kBinaryOps = RESTAGE_BINARY(RESTAGE_ONE);
+#undef RESTAGE_ONE
 /// out = f(a, b), numpy broadcasting; out has the broadcast shape.
 struct BinaryArgs {
   Binary op;
   const Tensor& a;
   const Tensor& b;
+  Tensor& out;
+};
+/// What a gradient of f(a, b) is computed from: it is g = dL/dy, or of g alone, or also of the
+/// first number, of the second, or of both.
+enum class Partial { is_g, of_g, of_first, of_second, of_both };
+/// Of number `input` (0 or 1).
+constexpr Partial partial(Binary op, int input) {
+  using enum Partial;
+  constexpr Partial of[][2] = {
+#define RESTAGE_KEPT(name, a, b, help, domain, value, of_a, by_a, of_b, by_b) {of_a, of_b},
+      RESTAGE_BINARY(RESTAGE_KEPT)
+#undef RESTAGE_KEPT
+  };
+  return of[static_cast<int>(op)][input];
+}
+/// out = the gradient of number `input`, before it is summed to that number's shape; gy and out
+/// have the broadcast shape.
+struct BinaryGradArgs {
+  Binary op;
+  int input;        ///< 0 or 1
+  const Tensor* a;  ///< null where partial() needs none
+  const Tensor* b;
+  const Tensor& gy;
   Tensor& out;
 };
 /// out += a (same shape): accumulation of gradients.

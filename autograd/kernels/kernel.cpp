@@ -1,15 +1,12 @@
 #include "autograd/kernels/kernel.h"
 
-#include <algorithm>
 #include <atomic>
-#include <mutex>
-#include <set>
 #include <string>
 #include <vector>
 
 #include "autograd/base/error.h"
-#include "autograd/base/log.h"
 #include "autograd/base/module_path.h"
+#include "autograd/base/words.h"
 
 namespace restage {
 
@@ -63,11 +60,9 @@ Device device_of(std::string_view name) {
 #ifdef RESTAGE_CUDA
   static const bool found [[maybe_unused]] = add_cuda_device();  // on the first call
 #endif
-  std::string known;
-  for (size_t i = 0; i < backends().size(); ++i) {
+  for (size_t i = 0; i < backends().size(); ++i)
     if (backends()[i]->name() == name) return {static_cast<uint8_t>(i), 0};
-    known += (i > 0 ? ", " : "") + std::string(backends()[i]->name());
-  }
+  const std::string known = joined(backends(), [](const auto& b) { return b->name(); });
   if (name == "cuda") throw InputError("device", cuda_missing(), "take one of: " + known);
   throw InputError("device", "'" + std::string(name) + "' is none that this program knows",
                    "take one of: " + known);
@@ -80,19 +75,6 @@ int local_rank() { return rank_on_host; }
 MemoryStats memory_stats(Device device) { return backend(device).memory(); }
 void reset_peak_memory(Device device) { backend(device).reset_peak(); }
 void trim_memory(Device device) { backend(device).trim(); }
-
-bool has_fused(Device device, const char* op, std::initializer_list<std::type_index> contracts) {
-  const Backend& b = backend(device);
-  const auto has = [&](std::type_index args) { return b.supports(args); };
-  if (std::all_of(contracts.begin(), contracts.end(), has)) return true;
-  static std::mutex mutex;
-  static std::set<std::string> told;
-  const std::string line =
-      "device '" + std::string(b.name()) + "' has no kernel for " + op + ": composed of others";
-  const std::lock_guard lock(mutex);
-  if (told.insert(line).second) log_info(line);
-  return false;
-}
 
 void Backend::run(std::type_index args_type, const void* args) {
   const auto it = table_.find(args_type);

@@ -34,7 +34,6 @@ class Backend {
   virtual void reset_peak() = 0;
   virtual void trim() = 0;  ///< gives free memory back to the system
 
-  virtual bool supports(std::type_index args) const { return table_.contains(args); }
   /// Runs a kernel; Error naming the kernel and the device if the device has no such kernel.
   virtual void run(std::type_index args_type, const void* args);
 
@@ -66,10 +65,6 @@ int gpu_of(int local_rank, int count);
 /// device_of("cuda").
 void set_local_rank(int local_rank);
 int local_rank();
-
-/// Whether the device has kernels for all of these contracts. If not, an op is composed of other
-/// kernels, which is slower; the log says so once for each device and op.
-bool has_fused(Device device, const char* op, std::initializer_list<std::type_index> contracts);
 
 /// Room for a result: a tensor of the dtype and on the device of another, not initialised.
 inline Tensor empty_like(const Tensor& t, const Shape& shape) {

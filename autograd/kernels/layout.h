@@ -8,11 +8,12 @@
 namespace restage {
 
 /// For every o: out[o*out_stride + out_offset + i] = x[o*x_stride + x_offset + i], i < count.
-/// Slices and concatenation along one axis are both of this kind.
+/// Slices and concatenation along one axis are both of this kind. `add`: += (f32 and f64).
 struct CopyBlocksArgs {
   const Tensor& x;
   Tensor& out;
   int64_t outer, count, x_stride, x_offset, out_stride, out_offset;
+  bool add = false;
 };
 /// out axis i = x axis order[i].
 struct PermuteArgs {

@@ -1,6 +1,5 @@
 // Every kernel with its contract, once. Each backend declares a function of that name for each and
-// enters it into its table. An op whose kernels another backend lacks is composed of other ops
-// (has_fused()) or, if it cannot be, refused by name.
+// enters it into its table, so each has all of them.
 #pragma once
 
 #include "autograd/kernels/attention.h"
@@ -21,6 +20,7 @@
   K(unary, UnaryArgs)                                     \
   K(unary_grad, UnaryGradArgs)                            \
   K(binary, BinaryArgs)                                   \
+  K(binary_grad, BinaryGradArgs)                          \
   K(accumulate, AccumulateArgs)                           \
   K(dropout, DropoutArgs)                                 \
   K(relu_dropout_grad, ReluDropoutGradArgs)               \
@@ -58,8 +58,6 @@
   K(to_matrix, ToMatrixArgs)                              \
   K(to_matrix_grad, ToMatrixGradArgs)                     \
   K(from_matrix, FromMatrixArgs)                          \
-  K(atan2, Atan2Args)                                     \
-  K(atan2_grad, Atan2GradArgs)                            \
   K(fk, FkArgs)                                           \
   K(fk_grad, FkGradArgs)                                  \
   K(swing_twist, SwingTwistArgs)                          \

@@ -27,21 +27,6 @@ struct FromMatrixArgs {
   const Tensor& x;
   Tensor& out;
 };
-/// out = angle of (x, y) in (-pi, pi], computed in double; y, x and out have one shape.
-struct Atan2Args {
-  const Tensor& y;
-  const Tensor& x;
-  Tensor& out;
-};
-/// Gradients of y (out) and x: gy x / r^2 and -gy y / r^2, r^2 = x^2 + y^2; zero within 1e-6 of the
-/// origin, where the angle means nothing.
-struct Atan2GradArgs {
-  const Tensor& y;
-  const Tensor& x;
-  const Tensor& gy;
-  Tensor& out;
-  Tensor& g_x;
-};
 /// local [n, j, 9], rest [n, j, 3], root [n, 3] -> out [n, j, 12] = rows of [G | P].
 struct FkArgs {
   const Tensor& local;

@@ -2,10 +2,6 @@
 
 #include "autograd/kernels/attention.h"
 #include "autograd/kernels/layout.h"
-#include "autograd/ops/elementwise.h"
-#include "autograd/ops/layout.h"
-#include "autograd/ops/linear.h"
-#include "autograd/ops/points.h"
 
 namespace restage {
 namespace {
@@ -59,30 +55,6 @@ Grads NeighbourAttention::backward(const Saved& saved, const Tensor& gy, Needs n
   for (size_t i = 0; i < g.size(); ++i)
     if (!needs[i]) g[i] = Tensor();
   return g;
-}
-
-Var neighbour_attention(std::initializer_list<Var> inputs, const Tensor& index, double scale,
-                        bool dense) {
-  const NeighbourAttention op{index, scale, dense};
-  if (!has_fused(index.device(), NeighbourAttention::name,
-                 {typeid(NeighbourAttentionArgs), typeid(NeighbourAttentionGradArgs)})) {
-    check_call(op, inputs);
-    return neighbour_attention_reference(inputs, index, scale);
-  }
-  return call(op, inputs);
-}
-
-Var neighbour_attention_reference(std::initializer_list<Var> inputs, const Tensor& index,
-                                  double scale) {
-  const Var* x = inputs.begin();
-  const int64_t n = x[0].size(0), v = x[0].size(1), k = index.size(2), d = x[1].size(2);
-  const Var r = reshape(x[0], {n, v, 1, 3}) - gather(x[0], index);
-  const Var both = linear(linear(r, x[4], x[5], Activation::relu), x[6]);
-  const Var u = relu(reshape(x[1], {n, v, 1, d}) - gather(x[2], index) + slice(both, 3, 0, d));
-  const Var value = gather(x[3], index) + slice(both, 3, d, 2 * d);
-  const Var pooled = attention_pool(reshape(linear(u, x[7], x[8]), {n * v, k, d}),
-                                    reshape(value, {n * v, k, d}), scale);
-  return reshape(pooled, {n, v, d});
 }
 
 }  // namespace restage

@@ -26,11 +26,9 @@ struct NeighbourAttention {
 };
 
 /// inputs: xyz, query, key, value, W, b, M, G, g.
-Var neighbour_attention(std::initializer_list<Var> inputs, const Tensor& index, double scale,
-                        bool dense = false);
-/// The same function made of products, gathers and attention_pool(). Tests compare
-/// neighbour_attention() with it, and devices without a kernel for that op compute it.
-Var neighbour_attention_reference(std::initializer_list<Var> inputs, const Tensor& index,
-                                  double scale);
+inline Var neighbour_attention(std::initializer_list<Var> inputs, const Tensor& index, double scale,
+                               bool dense = false) {
+  return call(NeighbourAttention{index, scale, dense}, inputs);
+}
 
 }  // namespace restage

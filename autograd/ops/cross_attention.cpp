@@ -5,9 +5,6 @@
 #include "autograd/kernels/elementwise.h"
 #include "autograd/kernels/matmul.h"
 #include "autograd/kernels/reduce.h"
-#include "autograd/ops/elementwise.h"
-#include "autograd/ops/linear.h"
-#include "autograd/ops/reduce.h"
 
 namespace restage {
 namespace {
@@ -126,11 +123,6 @@ Grads CrossAttention::backward(const Saved& saved, const Tensor& gy, Needs) cons
                       .precision = precision});
   });
   return g;
-}
-
-Var cross_attention_reference(const Var& q, const Var& k, const Var& v, double factor) {
-  const Var product = matmul(q, k, false, true);
-  return matmul(softmax(factor == 1 ? product : scale(product, factor)), v);
 }
 
 }  // namespace restage

@@ -30,8 +30,5 @@ inline Var cross_attention(const Var& q, const Var& k, const Var& v, double fact
   return call(CrossAttention{factor, host ? CrossAttention::kOnHost : CrossAttention::kOnGpu},
               {q, k, v});
 }
-/// The same function made of matmul() and softmax(), which hold all scores. Tests and benchmarks
-/// compare cross_attention() with it.
-Var cross_attention_reference(const Var& q, const Var& k, const Var& v, double factor = 1);
 
 }  // namespace restage

@@ -3,16 +3,6 @@
 #include "autograd/kernels/reduce.h"
 
 namespace restage {
-namespace {
-
-Tensor negative(const Tensor& t) {
-  Tensor out = empty_like(t);
-  launch(UnaryArgs{Unary::neg, t, out});
-  return out;
-}
-
-}  // namespace
-
 Tensor sum_to(const Tensor& t, const Shape& shape) {
   if (t.shape() == shape) return t;
   Tensor current = t;
@@ -53,31 +43,44 @@ void BinaryOp<B>::check(Inputs x) const {
   require_floats(name, letters, x);
 }
 
+namespace {
+
+/// Whether the gradient of number `input` is computed from number `from`, too.
+constexpr bool reads(Binary op, int input, int from) {
+  const Partial of = partial(op, input);
+  return of == Partial::of_both || of == (from == 0 ? Partial::of_first : Partial::of_second);
+}
+
+}  // namespace
+
 template <Binary B>
 Tensor BinaryOp<B>::forward(Inputs x, Saved& saved) const {
-  if constexpr (B == Binary::mul || B == Binary::div)
-    saved.keep(
-        {saved.needs(1) ? x[0] : Tensor(), saved.needs(0) || B == Binary::div ? x[1] : Tensor()});
+  const auto kept = [&](int from) {
+    for (const int input : {0, 1})
+      if (reads(B, input, from) && saved.needs(static_cast<size_t>(input)))
+        return x[static_cast<size_t>(from)];
+    return Tensor();
+  };
+  if constexpr (reads(B, 0, 0) || reads(B, 0, 1) || reads(B, 1, 0) || reads(B, 1, 1))
+    saved.keep({kept(0), kept(1)});
   return binary(B, x[0], x[1]);
 }
 
 template <Binary B>
 Grads BinaryOp<B>::backward(const Saved& saved, const Tensor& gy, Needs needs) const {
-  const Shape &a = saved.shape(0), &b = saved.shape(1);
   Grads g(2);
-  if constexpr (B == Binary::add || B == Binary::sub) {
-    if (needs[0]) g[0] = sum_to(gy, a);
-    if (needs[1]) g[1] = B == Binary::add ? sum_to(gy, b) : negative(sum_to(gy, b));
-  } else if constexpr (B == Binary::mul) {
-    if (needs[0]) g[0] = sum_to(restage::binary(Binary::mul, gy, saved[1]), a);
-    if (needs[1]) g[1] = sum_to(restage::binary(Binary::mul, gy, saved[0]), b);
-  } else {
-    const Tensor ga = restage::binary(Binary::div, gy, saved[1]);
-    if (needs[0]) g[0] = sum_to(ga, a);
-    if (needs[1]) {
-      const Tensor top = restage::binary(Binary::mul, ga, saved[0]);
-      g[1] = sum_to(negative(restage::binary(Binary::div, top, saved[1])), b);
-    }
+  for (const int input : {0, 1}) {
+    const auto i = static_cast<size_t>(input);
+    if (!needs[i]) continue;
+    const Partial of = partial(B, input);
+    // What is of gy alone is summed first: it is proportional to gy.
+    const bool first = of == Partial::is_g || of == Partial::of_g;
+    g[i] = first ? sum_to(gy, saved.shape(i)) : gy;
+    if (of == Partial::is_g) continue;
+    Tensor out = empty_like(g[i]);
+    launch(BinaryGradArgs{B, input, reads(B, input, 0) ? &saved[0] : nullptr,
+                          reads(B, input, 1) ? &saved[1] : nullptr, g[i], out});
+    g[i] = first ? out : sum_to(out, saved.shape(i));
   }
   return g;
 }
@@ -121,9 +124,8 @@ Grads Dropout::backward(const Saved& saved, const Tensor& gy, Needs) const {
   return {gx};
 }
 
-template struct BinaryOp<Binary::add>;
-template struct BinaryOp<Binary::sub>;
-template struct BinaryOp<Binary::mul>;
-template struct BinaryOp<Binary::div>;
+#define RESTAGE_INSTANTIATE(name, ...) template struct BinaryOp<Binary::name>;
+RESTAGE_BINARY(RESTAGE_INSTANTIATE)
+#undef RESTAGE_INSTANTIATE
 
 }  // namespace restage

@@ -15,8 +15,20 @@ constexpr const char* name_of(Unary op) {
   return names[static_cast<int>(op)];
 }
 constexpr const char* name_of(Binary op) {
-  constexpr const char* names[] = {"add", "sub", "mul", "div"};
+  constexpr const char* names[] = {
+#define RESTAGE_NAME(name, ...) #name,
+      RESTAGE_BINARY(RESTAGE_NAME)
+#undef RESTAGE_NAME
+  };
   return names[static_cast<int>(op)];
+}
+constexpr const char* letters_of(Binary op) {
+  constexpr const char* letters[] = {
+#define RESTAGE_LETTERS(name, a, b, ...) #a "[...], " #b "[...] broadcastable",
+      RESTAGE_BINARY(RESTAGE_LETTERS)
+#undef RESTAGE_LETTERS
+  };
+  return letters[static_cast<int>(op)];
 }
 
 /// y = f(x), any shape.
@@ -45,7 +57,7 @@ struct UnaryOp {
 template <Binary B>
 struct BinaryOp {
   static constexpr const char* name = name_of(B);
-  static constexpr const char* letters = "a[...], b[...] broadcastable";
+  static constexpr const char* letters = letters_of(B);
   void check(Inputs x) const;
   Tensor forward(Inputs x, Saved& saved) const;
   Grads backward(const Saved& saved, const Tensor& gy, Needs needs) const;
@@ -84,10 +96,11 @@ RESTAGE_UNARY(RESTAGE_FUNCTION)
   inline Var name(const Var& x, double number) { return call(UnaryOp<Unary::name>{number}, {x}); }
 RESTAGE_UNARY_WITH_NUMBER(RESTAGE_FUNCTION)
 #undef RESTAGE_FUNCTION
-inline Var add(const Var& a, const Var& b) { return call(BinaryOp<Binary::add>{}, {a, b}); }
-inline Var sub(const Var& a, const Var& b) { return call(BinaryOp<Binary::sub>{}, {a, b}); }
-inline Var mul(const Var& a, const Var& b) { return call(BinaryOp<Binary::mul>{}, {a, b}); }
-inline Var div(const Var& a, const Var& b) { return call(BinaryOp<Binary::div>{}, {a, b}); }
+// The functions of binary_rows.h: add(a, b), atan2(y, x) and the others.
+#define RESTAGE_FUNCTION(name, a, b, ...) \
+  inline Var name(const Var& a, const Var& b) { return call(BinaryOp<Binary::name>{}, {a, b}); }
+RESTAGE_BINARY(RESTAGE_FUNCTION)
+#undef RESTAGE_FUNCTION
 inline Var operator+(const Var& a, const Var& b) { return add(a, b); }
 inline Var operator-(const Var& a, const Var& b) { return sub(a, b); }
 inline Var operator*(const Var& a, const Var& b) { return mul(a, b); }

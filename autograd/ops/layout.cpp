@@ -1,5 +1,6 @@
 #include "autograd/ops/layout.h"
 
+#include <algorithm>
 #include <cstdlib>
 
 #include "autograd/ops/elementwise.h"
@@ -10,12 +11,22 @@ namespace {
 
 int positive(int axis, int rank) { return axis < 0 ? axis + rank : axis; }
 
-/// Copies along one axis between x (size nx, from offset ox) and out (size no, at offset oo).
-void copy_axis(const Tensor& x, Tensor& out, int axis, int64_t ox, int64_t oo, int64_t count) {
+/// Copies or adds along one axis from x (offset ox) to out (offset oo).
+void copy_axis(const Tensor& x, Tensor& out, int axis, int64_t ox, int64_t oo, int64_t count,
+               bool add = false) {
   const int at = positive(axis, x.rank());
   const int64_t inner = x.shape().product(at + 1, x.rank());
   launch(CopyBlocksArgs{x, out, x.shape().product(0, at), count * inner, x.size(at) * inner,
-                        ox * inner, out.size(at) * inner, oo * inner});
+                        ox * inner, out.size(at) * inner, oo * inner, add});
+}
+
+/// Elements [from, from + count) along an axis.
+Tensor part_of(const Tensor& x, int axis, int64_t from, int64_t count) {
+  Shape shape = x.shape();
+  shape.set(axis, count);
+  Tensor y = empty_like(x, shape);
+  copy_axis(x, y, axis, from, 0, count);
+  return y;
 }
 
 }  // namespace
@@ -73,17 +84,52 @@ void Slice::check(Inputs x) const {
                 "range " + std::to_string(from) + ".." + std::to_string(to) + " does not fit");
 }
 
-Tensor Slice::forward(Inputs x, Saved&) const {
-  Shape shape = x[0].shape();
-  shape.set(axis, to - from);
-  Tensor y = empty_like(x[0], shape);
-  copy_axis(x[0], y, axis, from, 0, to - from);
-  return y;
-}
+Tensor Slice::forward(Inputs x, Saved&) const { return part_of(x[0], axis, from, to - from); }
 
 Grads Slice::backward(const Saved& saved, const Tensor& gy, Needs) const {
   Tensor gx = Tensor::zeros(saved.shape(0), gy.dtype(), gy.device());
   copy_axis(gy, gx, axis, 0, from, to - from);
+  return {gx};
+}
+
+void Slice::add_to(Tensor& total, const Tensor& gy) const {
+  copy_axis(gy, total, axis, 0, from, to - from, true);
+}
+
+void Split::check(Inputs x) const {
+  if (axis >= x[0].rank() || axis < -x[0].rank())
+    shape_error(name, letters, x, "no axis " + std::to_string(axis));
+  int64_t left = x[0].size(axis);
+  for (const int64_t size : sizes) left = size < 0 || size > left ? -1 : left - size;
+  if (left != 0 || sizes.size() == 0) {
+    std::string text;
+    for (const int64_t size : sizes) text += (text.empty() ? "" : ", ") + std::to_string(size);
+    shape_error(name, letters, x, "sizes " + text + " do not fit");
+  }
+}
+
+Tensors Split::forward(Inputs x, Saved&) const {
+  Tensors parts;
+  int64_t at = 0;
+  for (const int64_t size : sizes) {
+    parts.push_back(part_of(x[0], axis, at, size));
+    at += size;
+  }
+  return parts;
+}
+
+Grads Split::backward(const Saved& saved, std::span<const Tensor> gy, Needs) const {
+  const auto given =
+      std::find_if(gy.begin(), gy.end(), [](const Tensor& g) { return g.defined(); });
+  Tensor gx = empty_like(*given, saved.shape(0));
+  int64_t at = 0;
+  for (size_t i = 0; i < sizes.size(); ++i) {
+    Shape shape = saved.shape(0);
+    shape.set(axis, sizes[i]);
+    const Tensor none = gy[i].defined() ? Tensor() : Tensor::zeros(shape, gx.dtype(), gx.device());
+    copy_axis(gy[i].defined() ? gy[i] : none, gx, axis, 0, at, sizes[i]);
+    at += sizes[i];
+  }
   return {gx};
 }
 
@@ -119,10 +165,7 @@ Grads Concat::backward(const Saved& saved, const Tensor& gy, Needs needs) const 
   int64_t at = 0;
   for (size_t i = 0; i < needs.size(); ++i) {
     const int64_t n = saved.shape(i)[axis];
-    if (needs[i]) {
-      g[i] = empty_like(gy, saved.shape(i));
-      copy_axis(gy, g[i], axis, at, 0, n);
-    }
+    if (needs[i]) g[i] = part_of(gy, axis, at, n);
     at += n;
   }
   return g;

@@ -37,6 +37,19 @@ struct Slice {
   void check(Inputs x) const;
   Tensor forward(Inputs x, Saved& saved) const;
   Grads backward(const Saved& saved, const Tensor& gy, Needs needs) const;
+  void add_to(Tensor& total, const Tensor& gy) const;
+};
+
+/// The parts of x of these sizes (up to 16) along an axis. Its gradient is one concatenation, where
+/// slices of all parts would add up as many tensors of the size of x.
+struct Split {
+  static constexpr const char* name = "split";
+  static constexpr const char* letters = "x[... n ...], sizes that add up to n";
+  int axis;
+  InlineVector<int64_t, kMaxInputs> sizes;
+  void check(Inputs x) const;
+  Tensors forward(Inputs x, Saved& saved) const;
+  Grads backward(const Saved& saved, std::span<const Tensor> gy, Needs needs) const;
 };
 
 /// Joins up to 16 tensors along an axis.
@@ -86,6 +99,9 @@ inline Var reshape(const Var& x, const Shape& shape) { return call(Reshape{shape
 inline Var permute(const Var& x, const Axes& order) { return call(Permute{order}, {x}); }
 inline Var slice(const Var& x, int axis, int64_t from, int64_t to) {
   return call(Slice{axis, from, to}, {x});
+}
+inline Vars split(const Var& x, int axis, std::initializer_list<int64_t> sizes) {
+  return call(Split{axis, sizes}, {x});
 }
 inline Var concat(std::initializer_list<Var> xs, int axis) { return call(Concat{axis}, xs); }
 /// The same of any number of tensors, but one.

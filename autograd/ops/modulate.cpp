@@ -1,8 +1,5 @@
 #include "autograd/ops/modulate.h"
 
-#include "autograd/ops/elementwise.h"
-#include "autograd/ops/linear.h"
-
 namespace restage {
 
 void Modulate::check(Inputs x) const {
@@ -31,23 +28,6 @@ Grads Modulate::backward(const Saved& s, const Tensor& gy, Needs needs) const {
   launch(ModulateGradArgs{s[0], s[1], s[2], s[3], s[4], s[5], gy, g[0], needs[1] ? &g[1] : nullptr,
                           g[2], g[3], g[4], g[5], activation});
   return g;
-}
-
-Var modulate(const Var& x, const Var& mesh, const Var& scale, const Var& scale_bias,
-             const Var& shift, const Var& shift_bias, Activation activation) {
-  const Modulate op{activation};
-  if (!has_fused(x.value.device(), Modulate::name,
-                 {typeid(ModulateArgs), typeid(ModulateGradArgs)})) {
-    check_call(op, {x, mesh, scale, scale_bias, shift, shift_bias});
-    return modulate_reference(x, mesh, scale, scale_bias, shift, shift_bias, activation);
-  }
-  return call(op, {x, mesh, scale, scale_bias, shift, shift_bias});
-}
-
-Var modulate_reference(const Var& x, const Var& mesh, const Var& scale, const Var& scale_bias,
-                       const Var& shift, const Var& shift_bias, Activation activation) {
-  const Var y = linear(mesh, scale, scale_bias) * x + linear(mesh, shift, shift_bias);
-  return activation == Activation::relu ? relu(y) : y;
 }
 
 }  // namespace restage

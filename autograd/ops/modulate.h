@@ -20,12 +20,10 @@ struct Modulate {
   Grads backward(const Saved& saved, const Tensor& gy, Needs needs) const;
 };
 
-Var modulate(const Var& x, const Var& mesh, const Var& scale, const Var& scale_bias,
-             const Var& shift, const Var& shift_bias, Activation activation = Activation::none);
-/// The same function made of linear(), products and sums. Tests compare modulate() with it, and
-/// devices without a kernel for that op compute it.
-Var modulate_reference(const Var& x, const Var& mesh, const Var& scale, const Var& scale_bias,
-                       const Var& shift, const Var& shift_bias,
-                       Activation activation = Activation::none);
+inline Var modulate(const Var& x, const Var& mesh, const Var& scale, const Var& scale_bias,
+                    const Var& shift, const Var& shift_bias,
+                    Activation activation = Activation::none) {
+  return call(Modulate{activation}, {x, mesh, scale, scale_bias, shift, shift_bias});
+}
 
 }  // namespace restage

@@ -1,8 +1,6 @@
 #include "autograd/ops/points.h"
 
 #include "autograd/kernels/points.h"
-#include "autograd/ops/elementwise.h"
-#include "autograd/ops/reduce.h"
 
 namespace restage {
 
@@ -53,20 +51,6 @@ Grads AttentionPool::backward(const Saved& saved, const Tensor& gy, Needs) const
   Tensor g_value = empty_like(gy, saved[0].shape());
   launch(AttentionPoolGradArgs{saved[0], saved[1], saved[2], gy, g_score, g_value, scale});
   return {g_score, g_value};
-}
-
-Var attention_pool(const Var& score, const Var& value, double scale) {
-  const AttentionPool op{scale};
-  if (!has_fused(score.value.device(), AttentionPool::name,
-                 {typeid(AttentionPoolArgs), typeid(AttentionPoolGradArgs)})) {
-    check_call(op, {score, value});
-    return attention_pool_reference(score, value, scale);
-  }
-  return call(op, {score, value});
-}
-
-Var attention_pool_reference(const Var& score, const Var& value, double scale_) {
-  return sum(softmax(scale(score, scale_), 1) * value, 1);
 }
 
 }  // namespace restage

@@ -22,9 +22,8 @@ struct AttentionPool {
   Grads backward(const Saved& saved, const Tensor& gy, Needs needs) const;
 };
 
-Var attention_pool(const Var& score, const Var& value, double scale);
-/// The same function made of softmax, product and sum. Tests compare attention_pool() with it, and
-/// devices without a kernel for that op compute it.
-Var attention_pool_reference(const Var& score, const Var& value, double scale);
+inline Var attention_pool(const Var& score, const Var& value, double scale) {
+  return call(AttentionPool{scale}, {score, value});
+}
 
 }  // namespace restage

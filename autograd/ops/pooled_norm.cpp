@@ -1,9 +1,6 @@
 #include "autograd/ops/pooled_norm.h"
 
 #include "autograd/kernels/pooled_norm.h"
-#include "autograd/ops/elementwise.h"
-#include "autograd/ops/linear.h"
-#include "autograd/ops/reduce.h"
 
 namespace restage {
 
@@ -42,24 +39,6 @@ Grads PooledNorm::backward(const Saved& s, const Tensor& gy, Needs needs) const 
                             activation});
   if (needs[2]) g[2] = Tensor::zeros(scale.shape(), gy.dtype(), gy.device());
   return g;
-}
-
-Var pooled_norm(const Var& x, const Var& weight, const Var& bias, const Var& scale,
-                const Var& shift, Activation activation, double eps, BatchStatistics* statistics) {
-  const PooledNorm op{activation, eps, statistics};
-  if (!has_fused(x.value.device(), PooledNorm::name,
-                 {typeid(PooledNormArgs), typeid(PooledNormGradArgs)})) {
-    check_call(op, {x, weight, bias, scale, shift});
-    return pooled_norm_reference(x, weight, bias, scale, shift, activation, eps, statistics);
-  }
-  return call(op, {x, weight, bias, scale, shift});
-}
-
-Var pooled_norm_reference(const Var& x, const Var& weight, const Var& bias, const Var& scale,
-                          const Var& shift, Activation activation, double eps,
-                          BatchStatistics* statistics) {
-  const Var y = batch_norm(linear(x, weight, bias), scale, shift, eps, statistics);
-  return max(activation == Activation::relu ? relu(y) : y, 1);
 }
 
 }  // namespace restage

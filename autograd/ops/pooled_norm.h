@@ -10,8 +10,7 @@ namespace restage {
 /// mode); the gradient of a maximum goes to the first point that attains it. Exact, and cheaper
 /// than its parts: the gradient has one point per channel and cloud, and batch norm spreads it only
 /// along an affine function of x, so the backward pass needs products of i x i matrices instead of
-/// [n v, i] x [i, o] ones (docs/notes/performance_log.md). The bias has no gradient: batch norm
-/// takes it away.
+/// [n v, i] x [i, o] ones. The bias has no gradient: batch norm takes it away.
 struct PooledNorm {
   static constexpr const char* name = "pooled_norm";
   static constexpr const char* letters = "x[n, v, i], W[o, i], b[o], scale[o], shift[o], v > 0";
@@ -23,13 +22,10 @@ struct PooledNorm {
   Grads backward(const Saved& saved, const Tensor& gy, Needs needs) const;
 };
 
-Var pooled_norm(const Var& x, const Var& weight, const Var& bias, const Var& scale,
-                const Var& shift, Activation activation = Activation::none, double eps = 1e-5,
-                BatchStatistics* statistics = nullptr);
-/// The same function made of linear, batch norm, ReLU and max. Tests compare pooled_norm() with it,
-/// and devices without a kernel for that op compute it.
-Var pooled_norm_reference(const Var& x, const Var& weight, const Var& bias, const Var& scale,
-                          const Var& shift, Activation activation = Activation::none,
-                          double eps = 1e-5, BatchStatistics* statistics = nullptr);
+inline Var pooled_norm(const Var& x, const Var& weight, const Var& bias, const Var& scale,
+                       const Var& shift, Activation activation = Activation::none,
+                       double eps = 1e-5, BatchStatistics* statistics = nullptr) {
+  return call(PooledNorm{activation, eps, statistics}, {x, weight, bias, scale, shift});
+}
 
 }  // namespace restage

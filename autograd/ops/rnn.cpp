@@ -5,9 +5,6 @@
 #include "autograd/kernels/matmul.h"
 #include "autograd/kernels/reduce.h"
 #include "autograd/kernels/rnn.h"
-#include "autograd/ops/elementwise.h"
-#include "autograd/ops/layout.h"
-#include "autograd/ops/linear.h"
 
 namespace restage {
 namespace {
@@ -104,34 +101,6 @@ Grads Recurrence::backward(const Saved& saved, const Tensor& gy, Needs) const {
   Grads g{empty_like(gy), empty_like(gy), empty_like(saved[1])};
   launch(RecurrenceGradArgs{saved[0], saved[2], saved[1], gy, g[0], g[2], g[1]});
   return g;
-}
-
-Var gru(const Var& x, const Var& h0, const Var& w_ih, const Var& w_hh, const Var& b_ih,
-        const Var& b_hh) {
-  const Gru op;
-  if (!has_fused(x.value.device(), Gru::name, {typeid(GruArgs), typeid(GruGradArgs)})) {
-    check_call(op, {x, h0, w_ih, w_hh, b_ih, b_hh});
-    return gru_reference(x, h0, w_ih, w_hh, b_ih, b_hh);
-  }
-  return call(op, {x, h0, w_ih, w_hh, b_ih, b_hh});
-}
-
-Var gru_reference(const Var& x, const Var& h0, const Var& w_ih, const Var& w_hh, const Var& b_ih,
-                  const Var& b_hh) {
-  const int64_t n = x.size(1), h = h0.size(1);
-  if (x.size(0) == 0) return slice(reshape(h0, {1, n, h}), 0, 0, 0);
-  Var state = h0, out;
-  for (int64_t t = 0; t < x.size(0); ++t) {
-    const Var gi = linear(reshape(slice(x, 0, t, t + 1), {n, x.size(2)}), w_ih, b_ih);
-    const Var gh = linear(state, w_hh, b_hh);
-    const auto part = [&](const Var& g, int64_t i) { return slice(g, 1, i * h, (i + 1) * h); };
-    const Var r = sigmoid(part(gi, 0) + part(gh, 0)), z = sigmoid(part(gi, 1) + part(gh, 1));
-    const Var candidate = tanh(part(gi, 2) + r * part(gh, 2));
-    state = candidate + z * (state - candidate);
-    const Var row = reshape(state, {1, n, h});
-    out = t == 0 ? row : concat({out, row}, 0);
-  }
-  return out;
 }
 
 }  // namespace restage

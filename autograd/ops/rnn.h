@@ -33,11 +33,9 @@ inline Var recurrence(const Var& a, const Var& b, const Var& first) {
 }
 
 /// y [t, n, h]: hidden states of all steps.
-Var gru(const Var& x, const Var& h0, const Var& w_ih, const Var& w_hh, const Var& b_ih,
-        const Var& b_hh);
-/// The same function made of elementary ops. Tests compare gru() with it, and devices without a
-/// kernel for that op compute it.
-Var gru_reference(const Var& x, const Var& h0, const Var& w_ih, const Var& w_hh, const Var& b_ih,
-                  const Var& b_hh);
+inline Var gru(const Var& x, const Var& h0, const Var& w_ih, const Var& w_hh, const Var& b_ih,
+               const Var& b_hh) {
+  return call(Gru{}, {x, h0, w_ih, w_hh, b_ih, b_hh});
+}
 
 }  // namespace restage

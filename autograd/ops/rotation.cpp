@@ -47,24 +47,6 @@ Grads ToMatrix::backward(const Saved& saved, const Tensor& gy, Needs) const {
   return {gx};
 }
 
-void Atan2::check(Inputs x) const {
-  if (!(x[0].shape() == x[1].shape())) shape_error(name, letters, x, "shapes differ");
-  require_floats(name, letters, x);
-}
-
-Tensor Atan2::forward(Inputs x, Saved& saved) const {
-  Tensor y = empty_like(x[0]);
-  launch(Atan2Args{x[0], x[1], y});
-  saved.keep({x[0], x[1]});
-  return y;
-}
-
-Grads Atan2::backward(const Saved& saved, const Tensor& gy, Needs) const {
-  Grads g{empty_like(gy), empty_like(gy)};
-  launch(Atan2GradArgs{saved[0], saved[1], gy, g[0], g[1]});
-  return g;
-}
-
 void ForwardKinematics::check(Inputs x) const {
   const bool ranks = x[0].rank() == 4 && x[1].rank() == 3 && x[2].rank() == 2;
   if (!ranks || x[0].size(2) != 3 || x[0].size(3) != 3 || x[1].size(2) != 3 || x[2].size(1) != 3)

@@ -18,16 +18,6 @@ struct ToMatrix {
   Grads backward(const Saved& saved, const Tensor& gy, Needs needs) const;
 };
 
-/// Angle of the direction (x, y), radians in (-pi, pi]. Near the origin, where it has no
-/// derivative, the gradient is zero (kernels/rotation.h).
-struct Atan2 {
-  static constexpr const char* name = "atan2";
-  static constexpr const char* letters = "y[...], x[...]";
-  void check(Inputs x) const;
-  Tensor forward(Inputs x, Saved& saved) const;
-  Grads backward(const Saved& saved, const Tensor& gy, Needs needs) const;
-};
-
 /// Local rotations, rest joints and posed root -> [n, j, 3, 4], per joint [global rotation |
 /// position].
 struct ForwardKinematics {
@@ -61,7 +51,6 @@ Var matrix_to_sixd(const Var& r);
 Tensor matrix_to_quaternion(const Tensor& r);
 Tensor matrix_to_axis_angle(const Tensor& r);
 
-inline Var atan2(const Var& y, const Var& x) { return call(Atan2{}, {y, x}); }
 inline Var forward_kinematics(const Var& local, const Var& rest, const Var& root,
                               std::span<const int> parents) {
   return call(ForwardKinematics{{parents.begin(), parents.end()}}, {local, rest, root});

@@ -4,7 +4,9 @@
 #include <atomic>
 #include <cmath>
 #include <unordered_set>
+#include <utility>
 
+#include "autograd/base/words.h"
 #include "autograd/kernels/elementwise.h"
 #include "autograd/kernels/update.h"
 
@@ -15,6 +17,19 @@ std::atomic<int> finite_checks{0};
 
 std::string text_of(const Tensor& t) {
   return t.defined() ? t.shape().str() + " " + name_of(t.dtype()) : "none";
+}
+
+/// The same numbers where whoever writes changes nothing of others: nodes may share a gradient.
+Tensor to_write(Tensor gradient) { return gradient.shared() ? gradient.clone() : gradient; }
+
+/// total += gradient; an undefined total is none yet.
+void accumulate(Tensor& total, Tensor gradient) {
+  if (!total.defined()) {
+    total = std::move(gradient);
+  } else {
+    total = to_write(std::move(total));
+    launch(AccumulateArgs{gradient, total});
+  }
 }
 
 }  // namespace
@@ -31,10 +46,8 @@ void require_finite(const Tensor& t, const char* op, const std::string& path, co
 }
 
 void shape_error(const char* op, const char* letters, Inputs inputs, const std::string& why) {
-  std::string shapes;
-  for (const Tensor& t : inputs) shapes += (shapes.empty() ? "" : ", ") + text_of(t);
-  throw ShapeError(std::string(op) + " " + letters + ": " + why + "; got " + shapes + " in " +
-                   module_path());
+  throw ShapeError(std::string(op) + " " + letters + ": " + why + "; got " +
+                   joined(inputs, text_of) + " in " + module_path());
 }
 
 void too_many_inputs(const char* op, const char* letters, std::span<const Var> inputs) {
@@ -146,10 +159,7 @@ Var Tape::leaf(const Tensor& value, uint64_t id) {
     node.id = id;
     nodes_.push_back(std::move(node));
   }
-  Var v(value);
-  v.link = link_;
-  v.node = it->second;
-  return v;
+  return value_at(it->second, value);
 }
 
 void Tape::require_own(const Var& v) const {
@@ -158,7 +168,8 @@ void Tape::require_own(const Var& v) const {
     throw Error("a value is used after the backward pass that consumed its tape");
 }
 
-Var Tape::record(std::unique_ptr<Function> function, std::span<const Var> inputs, Tensor output) {
+int64_t Tape::enter(std::unique_ptr<Function> function, std::span<const Var> inputs,
+                    size_t results) {
   Node node;
   node.function = std::move(function);
   node.path = module_path();
@@ -166,22 +177,40 @@ Var Tape::record(std::unique_ptr<Function> function, std::span<const Var> inputs
     if (in.on_tape()) require_own(in);
     node.inputs.push_back(in.on_tape() ? in.node : -1);
   }
-  Var v(std::move(output));
-  v.link = link_;
-  v.node = first_ + static_cast<int64_t>(nodes_.size());
+  node.results = results;
+  const auto number = first_ + static_cast<int64_t>(nodes_.size());
   nodes_.push_back(std::move(node));
+  for (size_t i = 1; i < results; ++i) nodes_.emplace_back().results = 0;
+  return number;
+}
+
+Var Tape::value_at(int64_t node, Tensor value) const {
+  Var v(std::move(value));
+  v.link = link_;
+  v.node = node;
   return v;
 }
 
+Var Tape::record(std::unique_ptr<Function> function, std::span<const Var> inputs, Tensor result) {
+  return value_at(enter(std::move(function), inputs, 1), std::move(result));
+}
+
+Vars Tape::record(std::unique_ptr<Function> function, std::span<const Var> inputs,
+                  const Tensors& results) {
+  int64_t node = enter(std::move(function), inputs, results.size());
+  Vars out;
+  for (const Tensor& y : results) out.push_back(value_at(node++, y));
+  return out;
+}
+
 /// The gradients of the op's inputs; checks what Grads promises.
-Grads Tape::Node::backward(const Tensor& gy) const {
+Grads Tape::Node::backward(std::span<const Tensor> gy) const {
   const Saved& saved = function->saved();
   const auto fail = [this](const std::string& what) {
     throw Error(std::string("backward of '") + name() + "' in " + path + ": " + what);
   };
   if (!saved.intact())
     fail("a tensor that it keeps was changed after the forward pass; change a clone");
-  const OpScope running(name());
   InlineVector<bool, kMaxInputs> needs;
   for (const int64_t input : inputs) needs.push_back(input >= 0);
   Grads g = function->backward(gy, Needs(needs.data(), needs.size()));
@@ -231,34 +260,31 @@ Gradients Tape::backward(const Var& loss, const Tensor& gradient) {
   kept_.clear();
   Gradients result;
   result.set_tape(link_);
-  std::unordered_set<const void*> given{gradient.address()};
-  // Whoever writes to a gradient changes that one alone.
-  const auto own = [&given](const Tensor& g) {
-    return given.insert(g.address()).second ? g : g.clone();
-  };
   for (size_t i = at(loss.node) + 1; i-- > 0;) {
     Node& node = nodes[i];
-    if (!grads[i].defined()) continue;  // the loss does not depend on it
-    const int64_t number = first + static_cast<int64_t>(i);
-    if (kept.contains(number)) result.set_inner(number, grads[i].clone());
+    const std::span gy(&grads[i], node.results);  // none: what is there is taken by the op's node
+    bool any = false;
+    for (size_t k = 0; k < gy.size(); ++k) {
+      const int64_t number = first + static_cast<int64_t>(i + k);
+      any = any || gy[k].defined();
+      if (gy[k].defined() && kept.contains(number)) result.set_inner(number, gy[k].clone());
+    }
+    if (!any) continue;  // the loss does not depend on it
     if (node.function == nullptr) {
-      result.set(node.id, own(grads[i]));
+      result.set(node.id, to_write(std::move(gy[0])));
       continue;
     }
-    const Grads gx = node.backward(grads[i]);
-    for (size_t k = 0; k < node.inputs.size(); ++k) {
-      if (node.inputs[k] < 0) continue;
-      Tensor& target = grads[at(node.inputs[k])];
-      if (target.defined()) {
-        Tensor total = target.clone();  // the first gradient may be shared with another node
-        launch(AccumulateArgs{gx[k], total});
-        target = total;
-      } else {
-        target = gx[k];
-      }
+    const OpScope running(node.name());
+    const bool alone = node.inputs.size() == 1 && node.inputs[0] >= 0;
+    Tensor* total = alone ? &grads[at(node.inputs[0])] : nullptr;
+    if (!alone || !total->defined() || !node.function->add_to(*total, gy[0])) {
+      Grads gx = node.backward(gy);
+      std::fill(gy.begin(), gy.end(), Tensor());  // not shared any more, unless by gx
+      for (size_t k = 0; k < node.inputs.size(); ++k)
+        if (node.inputs[k] >= 0) accumulate(grads[at(node.inputs[k])], std::move(gx[k]));
     }
+    std::fill(gy.begin(), gy.end(), Tensor());
     node.function.reset();  // frees what the op had kept
-    grads[i] = Tensor();
   }
   return result;
 }

@@ -44,8 +44,11 @@ struct Var {
   Var detach() const { return Var(value); }
 };
 
-inline constexpr size_t kMaxInputs = 16;  ///< most inputs of an op
+inline constexpr size_t kMaxInputs = 16;  ///< most inputs, and results, of an op
 using Inputs = std::span<const Tensor>;
+/// Results of an op that has several, as tensors and as values.
+using Tensors = InlineVector<Tensor, kMaxInputs>;
+using Vars = InlineVector<Var, kMaxInputs>;
 /// One gradient per input, of the input's shape and dtype; undefined only where it is not needed.
 /// (Something that has no gradient, such as the index of gather, is a member of the op and not an
 /// input.)
@@ -139,7 +142,7 @@ class Tape {
   /// (PyTorch's retain_grad): Gradients::find(v).
   void keep_gradient(const Var& v);
   size_t size() const { return nodes_.size(); }
-  /// What node i is: an op by its name, or "leaf".
+  /// What node i is: an op by its name, "leaf", or "another result" of the op before it.
   const char* name(size_t i) const { return nodes_[i].name(); }
   /// What node i keeps for the backward pass; null for a leaf.
   const Saved* saved(size_t i) const {
@@ -148,23 +151,36 @@ class Tape {
 
   struct Function {
     virtual ~Function() = default;
-    virtual Grads backward(const Tensor& gy, Needs needs) const = 0;
+    /// From a gradient for each result; undefined are those of results that the loss does not
+    /// depend on, but never all of them.
+    virtual Grads backward(std::span<const Tensor> gy, Needs needs) const = 0;
+    /// Adds the gradient of the only input to what there is of it, where that takes less than to
+    /// make it; false: it does not.
+    virtual bool add_to(Tensor& /*total*/, const Tensor& /*gy*/) const { return false; }
     virtual const char* name() const = 0;
     virtual const Saved& saved() const = 0;
   };
-  /// Used by call(): enters an op with its output.
-  Var record(std::unique_ptr<Function> function, std::span<const Var> inputs, Tensor output);
+  /// Used by call(): enters an op with its result, or with its results.
+  Var record(std::unique_ptr<Function> function, std::span<const Var> inputs, Tensor result);
+  Vars record(std::unique_ptr<Function> function, std::span<const Var> inputs,
+              const Tensors& results);
 
  private:
+  /// A leaf, or an op with its first result. An op's other results have nodes behind that one.
   struct Node {
-    std::unique_ptr<Function> function;  // null: a leaf
+    std::unique_ptr<Function> function;  // null: a leaf, or another result
     std::vector<int64_t> inputs;         // node of each input, -1: constant
     uint64_t id = 0;                     // of a leaf
     std::string path;
-    const char* name() const { return function ? function->name() : "leaf"; }
-    Grads backward(const Tensor& gy) const;
+    size_t results = 1;  // 0: another result
+    const char* name() const {
+      return function ? function->name() : results == 1 ? "leaf" : "another result";
+    }
+    Grads backward(std::span<const Tensor> gy) const;
   };
   void require_own(const Var& v) const;
+  int64_t enter(std::unique_ptr<Function> function, std::span<const Var> inputs, size_t results);
+  Var value_at(int64_t node, Tensor value) const;
 
   TapeLink link_;
   std::vector<Node> nodes_;
@@ -203,8 +219,20 @@ namespace detail {
 template <class Op>
 struct Recorded final : Tape::Function {
   Recorded(Op o, Saved s) : op(std::move(o)), kept(std::move(s)) {}
-  Grads backward(const Tensor& gy, Needs needs) const override {
-    return op.backward(kept, gy, needs);
+  Grads backward(std::span<const Tensor> gy, Needs needs) const override {
+    if constexpr (requires { op.backward(kept, gy, needs); }) {
+      return op.backward(kept, gy, needs);
+    } else {
+      return op.backward(kept, gy[0], needs);
+    }
+  }
+  bool add_to(Tensor& total, const Tensor& gy) const override {
+    if constexpr (requires { op.add_to(total, gy); }) {
+      if (total.shared()) total = total.clone();
+      op.add_to(total, gy);
+      return true;
+    }
+    return false;
   }
   const char* name() const override { return Op::name; }
   const Saved& saved() const override { return kept; }
@@ -212,14 +240,31 @@ struct Recorded final : Tape::Function {
   Saved kept;
 };
 
+inline void require_finite_result(const Tensor& y, const char* op) {
+  require_finite(y, op, module_path(), "forward");
+}
+inline void require_finite_result(const Tensors& results, const char* op) {
+  for (const Tensor& y : results) require_finite_result(y, op);
+}
+inline Var constant(Tensor y) { return Var(std::move(y)); }
+inline Vars constant(const Tensors& results) {
+  Vars out;
+  for (const Tensor& y : results) out.push_back(Var(y));
+  return out;
+}
+
 }  // namespace detail
 
-/// Runs an op: checks, computes, records. The only door through which ops are called. An op is a
-/// struct with: `static constexpr const char* name`, `letters` (its dimension letters, for
+/// Runs an op: checks, computes, records. The only door through which ops are called: a Var. An op
+/// is a struct with: `static constexpr const char* name`, `letters` (its dimension letters, for
 /// messages), `void check(Inputs) const` (throws through shape_error), `Tensor forward(Inputs,
-/// Saved&) const`, `Grads backward(const Saved&, const Tensor& gy, Needs) const`.
+/// Saved&) const`, `Grads backward(const Saved&, const Tensor& gy, Needs) const`. Of an op with
+/// several results (call() gives Vars) forward() gives Tensors, and backward() takes a
+/// `std::span<const Tensor> gy` as Tape::Function does. An op that keeps
+/// nothing and whose gradient is mostly zeros may have `void add_to(Tensor& total, const Tensor&
+/// gy) const`, which adds the gradient of its only input to `total`.
 template <class Op>
-Var call(const Op& op, std::span<const Var> inputs) {
+auto call(const Op& op, std::span<const Var> inputs) {
   if (inputs.size() > kMaxInputs) too_many_inputs(Op::name, Op::letters, inputs);
   const OpScope running(Op::name);
   InlineVector<Tensor, kMaxInputs> values;
@@ -234,27 +279,16 @@ Var call(const Op& op, std::span<const Var> inputs) {
   require_one_device(in);
   op.check(in);
   Saved saved = tape ? Saved(in, Needs(needs.data(), needs.size())) : Saved();
-  Tensor y = op.forward(in, saved);
-  if (FiniteCheck::active()) require_finite(y, Op::name, module_path(), "forward");
-  if (tape == nullptr) return Var(std::move(y));
+  auto y = op.forward(in, saved);
+  if (FiniteCheck::active()) detail::require_finite_result(y, Op::name);
+  if (tape == nullptr) return detail::constant(std::move(y));
   return tape->record(std::make_unique<detail::Recorded<Op>>(op, std::move(saved)), inputs,
                       std::move(y));
 }
 
 template <class Op>
-Var call(const Op& op, std::initializer_list<Var> inputs) {
+auto call(const Op& op, std::initializer_list<Var> inputs) {
   return call(op, std::span<const Var>(inputs.begin(), inputs.size()));
-}
-
-/// Refuses what call() would refuse: for an op that is composed of other ops because a device lacks
-/// its kernel.
-template <class Op>
-void check_call(const Op& op, std::initializer_list<Var> inputs) {
-  std::vector<Tensor> values;
-  for (const Var& v : inputs) values.push_back(v.value);
-  const OpScope running(Op::name);
-  require_one_device(values);
-  op.check(values);
 }
 
 }  // namespace restage

@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <atomic>
 #include <cstring>
+#include <span>
 
 #include "autograd/base/error.h"
 #include "autograd/base/module_path.h"
+#include "autograd/base/words.h"
 #include "autograd/kernels/elementwise.h"
 #include "autograd/kernels/scratch.h"
 #include "autograd/tensor/host_view.h"
@@ -64,9 +66,7 @@ int64_t Shape::product(int from, int to) const {
 int64_t Shape::numel() const { return product(0, rank_); }
 
 std::string Shape::str() const {
-  std::string out = "[";
-  for (int i = 0; i < rank_; ++i) out += (i ? ", " : "") + std::to_string((*this)[i]);
-  return out + "]";
+  return "[" + joined(std::span(dims_).first(static_cast<size_t>(rank_))) + "]";
 }
 
 bool Shape::operator==(const Shape& other) const {
@@ -173,6 +173,8 @@ uint64_t Tensor::version() const { return storage_ ? storage_->version : 0; }
 void Tensor::written() {
   if (storage_) ++storage_->version;
 }
+
+bool Tensor::shared() const { return storage_ && (storage_.use_count() > 1 || storage_->owner); }
 
 template <class T>
 T* Tensor::data() {

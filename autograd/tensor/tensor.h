@@ -70,6 +70,9 @@ class Tensor {
   /// written().
   uint64_t version() const;
   void written();
+  /// Whether somebody else holds the memory, too: another tensor, or whoever owns what was
+  /// borrowed. Who writes to memory that is not shared changes nothing of others.
+  bool shared() const;
 
   Tensor reshape(const Shape& shape) const;     ///< shares the memory; one dimension may be -1
   Tensor rows(int64_t from, int64_t to) const;  ///< a range of the leading axis, shares the memory
@@ -124,8 +127,10 @@ struct MemoryStats {
 };
 MemoryStats memory_stats(Device device = {});
 void reset_peak_memory(Device device = {});
-/// Gives the free blocks that a device keeps back to the system. The device does so by itself
-/// before it says that there is no more memory.
+/// Gives the free blocks that a device keeps back to the system. A device does so by itself when it
+/// is refused memory, before it says that there is no more. A GPU refuses. Linux refuses the host
+/// only beyond a limit (ulimit -v, a strict vm.overcommit_memory): else it grants any size, and
+/// ends a process that writes to more pages than there are.
 void trim_memory(Device device = {});
 
 }  // namespace restage

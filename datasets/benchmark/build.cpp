@@ -15,8 +15,8 @@
 #include "datasets/benchmark/scans.h"
 #include "datasets/benchmark/sequence.h"
 #include "datasets/importers/batches.h"
-#include "datasets/importers/cmu.h"
 #include "datasets/importers/import.h"
+#include "datasets/importers/motions/cmu.h"
 #include "datasets/readers/errors.h"
 
 namespace restage {

@@ -1,4 +1,4 @@
-// `restage data build RECIPE`: the open benchmark as a folder (docs/notes/design/data.md).
+// `restage data build RECIPE`: the open benchmark as a folder (docs/benchmark.md).
 #pragma once
 
 #include <string>

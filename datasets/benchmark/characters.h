@@ -2,7 +2,7 @@
 #pragma once
 
 #include "datasets/benchmark/recipe.h"
-#include "datasets/importers/makehuman.h"
+#include "datasets/importers/bodies/makehuman.h"
 
 namespace restage {
 

@@ -5,7 +5,7 @@
 
 #include "autograd/base/atomic_file.h"
 #include "datasets/readers/errors.h"
-#include "datasets/readers/folders.h"
+#include "datasets/readers/frames/folders.h"
 #include "datasets/readers/sha256.h"
 #include "datasets/schema.h"
 

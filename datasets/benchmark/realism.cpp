@@ -8,6 +8,7 @@
 #include "autograd/base/parallel.h"
 #include "datasets/benchmark/floor.h"
 #include "datasets/readers/errors.h"
+#include "nn/geometry/normals.h"
 
 namespace restage {
 namespace {
@@ -201,16 +202,12 @@ int joints_inside(const Body& body, const Points& surface, const Joints& joints,
 
 double buried_share(const Body& body, size_t step, std::vector<std::string>* where) {
   const Points& x = body.rest.vertices;
-  std::vector<Vec3> normals(x.size(), Vec3::Zero());
-  for (const Triangle& t : body.rest.faces) {
-    const Vec3 n = (corner(x, t, 1) - corner(x, t, 0)).cross(corner(x, t, 2) - corner(x, t, 0));
-    for (const int32_t v : t) normals[v] += n;
-  }
+  const auto normals = vertex_normals<Vec3>(x, body.rest.faces, Vec3::Zero());
   size_t looked = 0, buried = 0;
   for (size_t v = 0; v < x.size(); v += std::max<size_t>(1, step)) {
-    if (!(normals[v].norm() > 0)) continue;
+    if (normals[v].isZero(0)) continue;
     ++looked;
-    const Vec3 at = x[v].cast<double>() + 0.003 * normals[v].normalized();
+    const Vec3 at = x[v].cast<double>() + 0.003 * normals[v];
     if (!(winding_number(x, body.rest.faces, at) > 0.5)) continue;
     ++buried;
     Eigen::Index joint = 0;

@@ -6,8 +6,8 @@
 
 #include "datasets/benchmark/sequence.h"
 #include "datasets/importers/batches.h"
+#include "datasets/readers/clouds/non_finite.h"
 #include "datasets/readers/errors.h"
-#include "datasets/readers/non_finite.h"
 
 namespace restage {
 namespace {

@@ -1,7 +1,7 @@
 #include "datasets/benchmark/sequence.h"
 
 #include "datasets/importers/batches.h"
-#include "datasets/readers/mesh_io.h"
+#include "datasets/readers/clouds/mesh_io.h"
 
 namespace restage {
 

@@ -7,6 +7,7 @@
 #include "autograd/base/atomic_file.h"
 #include "datasets/characters/gltf_document.h"
 #include "datasets/readers/errors.h"
+#include "nn/geometry/rotation_key.h"
 
 namespace restage {
 
@@ -18,7 +19,7 @@ GltfClipWriter::GltfClipWriter(std::string out, const std::string& in,
       rig_(std::move(rig)),
       options_(std::move(options)) {
   if (options_.name.empty())
-    throw InputError(out_, "its animation has no name", "give --clip-name");
+    throw InputError(out_, "its animation has no name", "give {clip-name}");
   GltfDocument(content_, in_).check_place(out_);
 }
 
@@ -29,17 +30,10 @@ void GltfClipWriter::push(const Pose& pose, std::optional<double> confidence,
   const size_t count = turns.local.size();
   for (size_t i = 0; i < count; ++i) {
     if (frames() == 0) nodes_.push_back(turns.local[i].first);
-    Eigen::Vector4d c = turns.local[i].second.coeffs();  // x, y, z, w
-    finite = finite && c.allFinite();
-    // q and -q are the same rotation; LINEAR interpolates the short way if signs agree.
-    double side = c[3];
-    if (turns_.size() >= count) {
-      const std::array<float, 4>& before = turns_[turns_.size() - count];
-      side = c[0] * before[0] + c[1] * before[1] + c[2] * before[2] + c[3] * before[3];
-    }
-    if (side < 0) c = -c;
-    turns_.push_back({static_cast<float>(c[0]), static_cast<float>(c[1]), static_cast<float>(c[2]),
-                      static_cast<float>(c[3])});
+    const Quat& turn = turns.local[i].second;
+    finite = finite && turn.coeffs().allFinite();
+    const size_t at = turns_.size();
+    turns_.push_back(rotation_key(turn, at >= count ? &turns_[at - count] : nullptr));
   }
   if (!finite)
     throw WorkError(out_ + ": the pose of frame " + std::to_string(frames()) +

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "datasets/importers/gltf_own_rig.h"
+#include "datasets/importers/rigs/gltf_own_rig.h"
 
 namespace restage {
 

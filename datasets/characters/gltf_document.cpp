@@ -9,8 +9,8 @@
 #include "autograd/base/atomic_file.h"
 #include "autograd/base/base64.h"
 #include "datasets/readers/errors.h"
-#include "datasets/readers/gltf_detail.h"
-#include "datasets/readers/text.h"
+#include "datasets/readers/gltf/gltf_detail.h"
+#include "datasets/readers/text/text.h"
 #include "nn/geometry/glb_file.h"
 
 namespace restage {
@@ -189,7 +189,7 @@ void GltfDocument::check_place(const std::string& out) const {
     const std::string file = (to / gltf::decode_percent(uri)).string();
     if (is_there(file) && read_file(file) != content)
       throw InputError(file, "is another file than the one of this name beside the target",
-                       "write into another folder, or end --out in .glb");
+                       "write into another folder, or end {out} in .glb");
   }
 }
 

@@ -7,8 +7,8 @@
 
 #include "autograd/base/atomic_file.h"
 #include "autograd/base/format.h"
-#include "datasets/readers/text.h"
-#include "datasets/readers/word_lines.h"
+#include "datasets/readers/text/text.h"
+#include "datasets/readers/text/word_lines.h"
 
 namespace restage {
 namespace {

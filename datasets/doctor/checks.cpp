@@ -4,9 +4,12 @@
 
 #include "autograd/base/log.h"
 #include "datasets/doctor/examine_detail.h"
+#include "datasets/doctor/orientation.h"
 #include "datasets/doctor/orientation_model.h"
 #include "datasets/doctor/words.h"
-#include "datasets/importers/axis.h"
+#include "datasets/importers/motions/axis.h"
+#include "datasets/readers/frames/memory_frames.h"
+#include "nn/models/views.h"
 
 namespace restage {
 
@@ -14,45 +17,35 @@ using namespace doctor_detail;
 
 namespace {
 
-/// Frames in memory, as one sequence.
-class Given final : public FrameSource {
- public:
-  explicit Given(const std::vector<Mesh>& frames) : frames_(frames) {}
-  std::optional<Frame> next() override {
-    if (at_ == frames_.size()) return std::nullopt;
-    const Mesh& frame = frames_[at_++];
-    return Frame{"", frame.vertices, frame.faces, 0};
-  }
-  void rewind() override { at_ = 0; }
-  int64_t frames() const override { return frames_.size(); }
-  double fps() const override { return kFps; }
+MemoryFrames frames_of(const std::vector<Mesh>& meshes) {
+  return {meshes.size(), [&meshes](size_t i) {
+            return Frame{"", meshes[i].vertices, meshes[i].faces, 0};
+          }};
+}
 
- private:
-  const std::vector<Mesh>& frames_;
-  size_t at_ = 0;
-};
+constexpr int kOurUp = 2;  // +y, of kDirections
 
 [[noreturn]] void refuse(const std::string& where, const Finding& f, const std::string& fix) {
   std::string what = f.what;
   if (f.sure < 1 && f.sure >= kUnsure) what += " (sure " + per_cent(f.sure) + ")";
-  throw InputError(where, what, fix + ", or --force to take it as it is");
+  throw InputError(where, what, fix + ", or {force} to take it as it is");
 }
 
 std::string scale_advice(double size, double given) {
   const UnitGuess raw = guess_unit(size / given);
-  if (raw.sure < kUnsure) return "give metres per unit with --scale";
-  return raw.unit.metres == 1 && given != 1 ? "leave --scale out"
-                                            : "give --scale " + number(raw.unit.metres);
+  if (raw.sure < kUnsure) return "give metres per unit with {scale}";
+  return raw.unit.metres == 1 && given != 1 ? "leave {scale} out"
+                                            : "give {scale} " + number(raw.unit.metres);
 }
 
 /// A direction of the frame that the source was brought into, by its axis `given`, as the source's.
 std::string own_axis(int up, const std::string& given) {
-  const Mat3 back = upright(parse_axis(given, "--source-up")).transpose();
+  const Mat3 back = upright(parse_axis(given, "{source-up}")).transpose();
   return to_string(axis_near(back * direction(up)));
 }
 
 std::string up_advice(int up, const std::string& given) {
-  return "give --source-up " + own_axis(up, given) + " (--source-up " + given +
+  return "give {source-up} " + own_axis(up, given) + " ({source-up} " + given +
          " where people lie or hang)";
 }
 
@@ -60,8 +53,8 @@ std::string up_advice(int up, const std::string& given) {
 void warn_of_up(const std::string& where, const Diagnosis& d, const Finding& f,
                 const SourceFrame& given) {
   log_warning(where + "the first clouds look as if " + own_axis(d.orientation.up, given.up) +
-              " were up (sure " + per_cent(f.sure) + "), but --source-up " + given.up +
-              " was given, and is taken");
+              " were up (sure " + per_cent(f.sure) + "), but " + spelled("{source-up} ") +
+              given.up + " was given, and is taken");
 }
 
 /// float32 holds coordinates to a centimetre up to here. A stray point may be anywhere, so all
@@ -70,24 +63,40 @@ void check_near(const Points& frame, const std::string& where, FrameMends option
   constexpr float kFar = 100'000;
   const auto is_far = [](const Point& p) { return p.cwiseAbs().maxCoeff() > kFar; };
   if (frame.empty() || !std::all_of(frame.begin(), frame.end(), is_far)) return;
-  throw InputError(where,
-                   "lies " + number(1e-3 * frame.front().cwiseAbs().maxCoeff()) +
-                       " km from the origin, where single precision loses centimetres",
-                   std::string("subtract the same origin from all frames") +
-                       (options == FrameMends::scale_and_force
-                            ? ", give the unit with --scale, or --force to take it as it is"
-                            : ""));
+  throw UnusableCloud(where,
+                      "lies " + number(1e-3 * frame.front().cwiseAbs().maxCoeff()) +
+                          " km from the origin, where single precision loses centimetres",
+                      std::string("subtract the same origin from all frames") +
+                          (options == FrameMends::scale_and_force
+                               ? ", give the unit with {scale}, or {force} to take it as it is"
+                               : ""));
+}
+
+/// The first clouds look as if `up` were up; whether all of the take does.
+void check_take(const TakeClouds& take, const std::string& where, int up, const Finding& first,
+                const SourceFrame& given) {
+  const std::optional<int> all = take ? up_of_take(take(), kOurUp) : std::nullopt;
+  if (all == kOurUp) {
+    log_warning(where +
+                ": nobody stands upright in the first clouds; by the others and the floor " +
+                given.up + " is taken as up");
+    return;
+  }
+  Finding said = first;
+  if (all && *all != up)
+    said.what = cat(kDirections[static_cast<size_t>(*all)], " is up over the whole take, not +y");
+  refuse(where, said, up_advice(all.value_or(up), given.up));
 }
 
 }  // namespace
 
 void check_source(const std::vector<Mesh>& first_frames, const std::string& where,
-                  const SourceFrame& given) {
+                  const SourceFrame& given, const TakeClouds& take) {
   for (const Mesh& frame : first_frames)
     if (frame.vertices.size() < kEnoughPoints) return;  // refused when its turn comes
   if (first_frames.empty()) return;
   check_near(first_frames.front().vertices, where, FrameMends::scale_and_force);
-  Given frames(first_frames);
+  MemoryFrames frames = frames_of(first_frames);
   const Diagnosis d = examine_frames(frames);
   const bool some_odd = !std::all_of(first_frames.begin(), first_frames.end(),
                                      [](const Mesh& m) { return may_be_a_person(m.vertices); });
@@ -104,7 +113,10 @@ void check_source(const std::vector<Mesh>& first_frames, const std::string& wher
       warn_of_up(where + ": ", d, f, given);
       continue;
     }
-    if (f.topic == "up") refuse(where, f, up_advice(d.orientation.up, given.up));
+    if (f.topic == "up") {
+      check_take(take, where, d.orientation.up, f, given);
+      continue;
+    }
     refuse(where, f, "restage doctor --fix OUT mends it");
   }
 }
@@ -112,7 +124,7 @@ void check_source(const std::vector<Mesh>& first_frames, const std::string& wher
 void check_target(const Mesh& target, const std::string& where, ExamineOptions options) {
   if (options.joints && is_mirrored(*options.joints).value_or(false))
     throw InputError(where, "is a mirror image: the joints named left are on the right",
-                     "mirror it (x to -x) where it was made, or exchange the names; or --force");
+                     "mirror it (x to -x) where it was made, or exchange the names; or {force}");
   options.target = true;
   const Diagnosis d = judge_surface(target, shape_of(target), repeats(target.vertices), options);
   for (const Finding& f : d.findings) {
@@ -122,9 +134,10 @@ void check_target(const Mesh& target, const std::string& where, ExamineOptions o
     Finding said = f;
     if (f.topic == "pose") said.what += ": " + f.evidence;
     refuse(where, said,
-           nobody                                   ? "give one whole person in T-pose"
-           : f.topic == "pose" || f.topic == "path" ? f.fix
-                                                    : "restage doctor --target --fix OUT mends it");
+           nobody ? "give one whole person in T-pose"
+           : f.topic == "pose" || f.topic == "path"
+               ? f.fix
+               : "restage doctor --as-target --fix OUT mends it");
   }
 }
 
@@ -135,7 +148,7 @@ void SourceWatch::look(const Points& cloud, const std::string& where) {
 }
 
 void SourceWatch::judge() {
-  Given frames(clouds_);
+  MemoryFrames frames = frames_of(clouds_);
   const Diagnosis d = examine_frames(frames);
   clouds_.clear();
   wrong_.reset();
@@ -175,13 +188,14 @@ bool may_be_a_person(const Points& frame) {
 void check_frame(const Points& frame, const std::string& where, FrameMends options) {
   check_near(frame, where, options);
   if (may_be_a_person(frame)) return;
-  throw InputError(where,
-                   "is of another size than people: half of its points lie within " +
-                       number(normalised(frame).size) + " m of the middle",
-                   options == FrameMends::scale_and_force
-                       ? "give all frames in metres (--scale), leave this one out, or --force to "
-                         "take it as it is"
-                       : "give metres (restage doctor --fix OUT makes metres of files)");
+  throw UnusableCloud(
+      where,
+      "is of another size than people: half of its points lie within " +
+          number(normalised(frame).size) + " m of the middle",
+      options == FrameMends::scale_and_force
+          ? "give all frames in metres ({scale}), leave this one out, or {force} to "
+            "take it as it is"
+          : "give metres (restage doctor --fix OUT makes metres of files)");
 }
 
 }  // namespace restage

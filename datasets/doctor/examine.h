@@ -4,13 +4,14 @@
 // alike, so a mirrored scan cannot be told from a right one (check_handedness() needs joints).
 #pragma once
 
+#include <functional>
 #include <map>
 #include <optional>
 #include <set>
 
 #include "datasets/doctor/finding.h"
 #include "datasets/doctor/shape.h"
-#include "datasets/readers/frame_folder.h"
+#include "datasets/readers/frames/frame_folder.h"
 
 namespace restage {
 
@@ -50,7 +51,12 @@ struct Diagnosis {
 
   /// Whether frames without points are put where so many are missing: up to a minute of them.
   bool is_kept(int64_t missing) const { return static_cast<double>(missing) <= 60 * fps; }
-  void say(const Finding& finding) { findings.push_back(finding); }
+  /// Settings in `what` and `fix` are named as {fps} (setting_names.h).
+  void say(Finding finding) {
+    finding.what = spelled(finding.what);
+    finding.fix = spelled(finding.fix);
+    findings.push_back(std::move(finding));
+  }
   bool usable() const;  ///< no finding that makes the result nonsense
   const Finding* find(const std::string& topic) const;
 };
@@ -72,7 +78,8 @@ Mesh mended(const Mesh& mesh, const Diagnosis& diagnosis, std::optional<Point>* 
 /// with those of a source; it refuses those of a target. `where` is added to the sentence.
 Finding non_finite(size_t points, const std::string& where, bool target = false);
 
-/// What is said of points that are the path of one point (readers/point_path.h), and what to do.
+/// What is said of points that are the path of one point (readers/clouds/point_path.h), and what to
+/// do.
 inline constexpr const char* kPath =
     "the points are places of one moving point, such as somebody's root, and no surface";
 inline constexpr const char* kPathFix = "give clouds of a whole person";
@@ -90,21 +97,24 @@ inline constexpr const char* kMirroredFix =
 std::optional<bool> is_mirrored(const Joints& joints, const Vec3& up = Vec3::UnitY());
 
 /// How a source was read: metres per unit, and which of its axes points up (parse_axis(),
-/// importers/axis.h; not "auto").
+/// importers/motions/axis.h; not "auto").
 struct SourceFrame {
   double scale = 1;
   std::string up = "y";
   bool up_known = false;  ///< somebody said so: what the clouds look like is then a warning
 };
 
-/// Cheap checks before retargeting: what the doctor finds wrong is refused in the doctor's words, a
-/// target as examine_surface() judges it with the same options (`target` is set here), a source by
-/// its first frames, brought into metres, y up, as `given`. What is only perhaps wrong passes.
-/// `where` names the input. InputError with the option that mends it (--scale, --source-up,
-/// --force). A rig of which left and right are exchanged is refused.
+/// Cheap checks before retargeting. Both throw an InputError for what the doctor finds wrong: its
+/// words are the doctor's, and `where` names the input. What is only perhaps wrong passes.
+/// check_source() looks at the first frames of a source, which have been brought into metres, y up,
+/// as `given` says. check_target() judges a target as examine_surface() does with the same options;
+/// ExamineOptions::target is set there. A rig of which left and right are exchanged is refused.
+/// Where the first frames look as if another axis were up, `take` gives clouds from all of the
+/// source, brought into the same frame: who lies at the beginning stands up later (up_of_take()).
 inline constexpr int kSourceFrames = 8;  ///< that are enough for check_source()
+using TakeClouds = std::function<std::vector<Points>()>;
 void check_source(const std::vector<Mesh>& first_frames, const std::string& where,
-                  const SourceFrame& given = {});
+                  const SourceFrame& given = {}, const TakeClouds& take = {});
 void check_target(const Mesh& target, const std::string& where, ExamineOptions options = {});
 
 /// What check_source() says of the up axis, of a second person and of floors, for a source that
@@ -114,9 +124,11 @@ class SourceWatch {
   /// `again`: clouds were taken before, so that the axes are known: who lies now fell.
   explicit SourceWatch(SourceFrame given = {}, bool again = false)
       : given_(std::move(given)), again_(again) {}
-  /// Takes the next cloud, already in metres, y up, as given. InputError with the kSourceFrames-th
-  /// cloud and those after it: for good where these clouds stand up along another axis; where they
-  /// show more than one person, until as many clouds in a row show no more. Then it looks no more.
+  /// Takes the next cloud, in metres, y up, as given. Every kSourceFrames clouds are judged
+  /// together. The first good judgement ends the watch: all later clouds pass. A bad judgement
+  /// refuses (InputError) the cloud that completed it and the clouds after it:
+  /// - all of them, where the clouds stand up along another axis;
+  /// - those before the next judgement, where the clouds show nobody, a floor or a second person.
   void look(const Points& cloud, const std::string& where);
   /// The clouds stand up along another axis: no cloud that follows will be better.
   bool hopeless() const { return settled_ && wrong_; }
@@ -134,8 +146,8 @@ class SourceWatch {
 
 /// Cheaply, of any frame: whether it is of a person's size, in metres.
 bool may_be_a_person(const Points& frame);
-/// InputError where it is not, or is so far away that float32 loses centimetres. `options`: which
-/// of them the message can name.
+/// UnusableCloud where it is not, or is so far away that float32 loses centimetres. `options`:
+/// which of them the message can name.
 enum class FrameMends { scale_and_force, none };
 void check_frame(const Points& frame, const std::string& where,
                  FrameMends options = FrameMends::scale_and_force);

@@ -5,7 +5,7 @@
 #include "datasets/doctor/examine_detail.h"
 #include "datasets/doctor/pose.h"
 #include "datasets/doctor/words.h"
-#include "datasets/readers/point_path.h"
+#include "datasets/readers/clouds/point_path.h"
 
 namespace restage {
 
@@ -44,7 +44,7 @@ void recognise(Diagnosis& d, const Seen& seen, const ExamineOptions& options) {
     throw InputError("",
                      cat("nobody whose head points along ", kDirections[d.orientation.up],
                          " faces ", kDirections[*options.facing]),
-                     "give two directions at right angles, --up and --facing");
+                     "give two directions at right angles, {up} and {facing}");
   d.orientation.facing = *options.facing;
   d.orientation.facing_sure = 1;
   d.orientation.turned = d.orientation.turned_sure = 0;
@@ -65,18 +65,18 @@ void judge_units(Diagnosis& d, bool target) {
     if (!sized) f.what += ", which makes " + tall;
     const UnitGuess found = guess_unit(d.size);
     if (!sized && found.sure >= kUnsure)
-      f.fix = "--scale " + number(found.unit.metres) + " makes a person of it";
+      f.fix = "{scale} " + number(found.unit.metres) + " makes a person of it";
   } else if (guess.sure < kUnsure) {
     if (sized) f.weight = Weight::note;
     f.what = "no unit (m, dm, inch, cm, mm) clearly makes a person of it";
     if (!sized && d.size > 0) f.what += "; in metres it is " + tall;
-    f.fix = "give metres per unit with --scale if they are not metres";
+    f.fix = "give metres per unit with {scale} if they are not metres";
   } else if (guess.unit.metres == 1) {
     f.what = "metres";
   } else {
     f.what = cat("1 unit is 1 ", guess.unit.name, ", not 1 m");
-    f.fix = target ? "--fix makes metres of it"
-                   : "--fix; or give retarget --scale " + number(guess.unit.metres);
+    f.fix = target ? "{fix} makes metres of it"
+                   : "{fix}; or give retarget {scale} " + number(guess.unit.metres);
   }
   d.say(f);
 }
@@ -94,27 +94,27 @@ void judge_up(Diagnosis& d, const Seen& seen, const ExamineOptions& options, siz
     if (shape.up != 2 && shape.up_sure >= kUnsure) {
       f.weight = Weight::note;
       f.what += cat(", though its shape looks as if ", kDirections[shape.up], " were");
-      f.fix = "say it with --up if the shape is right";
+      f.fix = "say it with {up} if the shape is right";
     }
   } else if (o.up_sure < kNobody) {
     f.weight = Weight::wrong;
     f.what = "nobody can be made out, and which axis is up cannot be told";
-    f.fix = "is it one whole person, and nothing else? If so, say --up";
+    f.fix = "is it one whole person, and nothing else? If so, say {up}";
   } else if (o.up_sure < kUnsure) {
     f.weight = Weight::note;
     f.what = cat("which axis is up cannot be told (perhaps ", kDirections[o.up], ")");
-    f.fix = "say it with --up; is it one whole person?";
+    f.fix = "say it with {up}; is it one whole person?";
   } else if (o.up != 2) {
     // What is of no person's size may be no person: then only a note.
     f.weight = o.up_sure >= kSure && d.unit.sure >= kUnsure ? Weight::wrong : Weight::note;
     f.what += ", not +y";
     if (o.up_sure >= kSure || options.target) {
-      f.fix = o.up == 4 && !options.target ? "--fix turns it; or give retarget --source-up z"
-                                           : "--fix turns it";
+      f.fix = o.up == 4 && !options.target ? "{fix} turns it; or give retarget {source-up} z"
+                                           : "{fix} turns it";
     } else {
       // Somebody who crawls or lies looks like that, too, and a target has to stand.
       f.what = cat(kDirections[o.up], " may be up, not +y");
-      f.fix = cat("--fix leaves it as it is; say --up=", kDirections[o.up], " if so");
+      f.fix = cat("{fix} leaves it as it is; say {up}=", kDirections[o.up], " if so");
       d.orientation = seen.vote.result(2);
       d.orientation.up_sure = kUnsure;
     }
@@ -142,11 +142,11 @@ void judge_facing(Diagnosis& d, const ExamineOptions& options) {
     if (std::abs(o.turned) > kTurnMatters)
       f.what += ", turned by about " + number(std::round(std::abs(o.turned) / 5) * 5) +
                 " degrees to their " + (o.turned > 0 ? "left" : "right");
-    if (turns_exactly(o)) f.fix = "--fix turns it by that angle";
+    if (turns_exactly(o)) f.fix = "{fix} turns it by that angle";
     // With another up axis the turn is part of that repair.
     if (options.target && o.up == 2 && o.facing != 4) {
       f.weight = o.facing_sure >= kSure ? Weight::wrong : Weight::note;
-      f.fix = "--fix turns it; a target has to face +z";
+      f.fix = "{fix} turns it; a target has to face +z";
     }
   }
   d.say(f);
@@ -182,7 +182,7 @@ Finding height_finding(const Diagnosis& d) {
   } else {
     f.what += ", which is nobody unless arms are raised: units that are not quite metres";
   }
-  f.fix = "if a person of 1.7 m should stand there, --scale " +
+  f.fix = "if a person of 1.7 m should stand there, {scale} " +
           number(d.unit.unit.metres * 1.7 / d.height) + " makes it so";
   return f;
 }
@@ -199,7 +199,7 @@ void level(Diagnosis& d, const std::vector<FlatPlane>& planes, Similarity& t) {
         Eigen::Quaterniond::FromTwoVectors(normal, Vec3::UnitY()).toRotationMatrix() * t.rotation;
     t.offset = plane.offset * plane.normal;
     d.say({"tilt", Weight::note, "the floor is tilted by " + number(std::round(tilt)) + " degrees",
-           0.95, "the plane under the person", "--fix levels it"});
+           0.95, "the plane under the person", "{fix} levels it"});
     return;
   }
 }
@@ -226,7 +226,7 @@ void judge_frame(Diagnosis& d, double lowest, double highest,
   if (!t.offset.isZero()) {
     f.weight = Weight::note;
     f.what = "at " + number(floor) + " m, not 0";
-    f.fix = "--fix moves it";
+    f.fix = "{fix} moves it";
   }
   d.say(f);
 }
@@ -255,7 +255,7 @@ void judge_plane(Diagnosis& d, const Parts& parts, const std::string& where) {
   d.say(
       {"plane", share >= kPlaneMatters ? Weight::wrong : Weight::note,
        cat(what, " is in view (", counted(parts.flat, "point"), ", ", per_cent(share), ")", where),
-       0.95, "points in one plane that reaches far beyond the person", "--fix removes it"});
+       0.95, "points in one plane that reaches far beyond the person", "{fix} removes it"});
 }
 
 void judge_parts(Diagnosis& d, const PersonShape& shape, const std::string& where) {
@@ -267,11 +267,11 @@ void judge_parts(Diagnosis& d, const PersonShape& shape, const std::string& wher
     d.say({"outliers", Weight::note,
            counted(parts.stray, "stray point") + " (" +
                per_cent(static_cast<double>(parts.stray) / all) + ")" + where,
-           1, "far from all others", "--fix removes them"});
+           1, "far from all others", "{fix} removes them"});
   if (parts.other > 0) {
     const auto person = static_cast<double>(shape.points.size());
     const bool somebody = static_cast<double>(parts.largest_other) > 0.4 * person;
-    Finding f{"others", somebody ? Weight::wrong : Weight::note, "", 0.9, "", "--fix removes it"};
+    Finding f{"others", somebody ? Weight::wrong : Weight::note, "", 0.9, "", "{fix} removes it"};
     f.what = (somebody ? "a second person" : "part of somebody or something else") +
              (" (" + counted(parts.other, "point")) + ")" + where;
     f.evidence = "a separate piece, " + number(parts.gap * metres) +
@@ -339,7 +339,7 @@ void judge_duplicates(Diagnosis& d, size_t equal, bool cloud, const std::string&
   if (equal == 0) return;
   d.say({"duplicates", cloud ? Weight::note : Weight::fact,
          counted(equal, "point") + " equal to another" + where, 1, "counted",
-         cloud ? "--fix removes them" : ""});
+         cloud ? "{fix} removes them" : ""});
 }
 
 }  // namespace doctor_detail
@@ -347,11 +347,11 @@ void judge_duplicates(Diagnosis& d, size_t equal, bool cloud, const std::string&
 Finding non_finite(size_t points, const std::string& where, bool target) {
   return {"non-finite",
           target ? Weight::wrong : Weight::note,
-          doctor_detail::counted(points, "point") + " with a NaN or infinite coordinate" + where +
+          counted(points, "point") + " with a NaN or infinite coordinate" + where +
               (target ? "" : ", which retarget leaves out"),
           1,
           "counted",
-          "--fix leaves them out"};
+          spelled("{fix} leaves them out")};
 }
 
 }  // namespace restage

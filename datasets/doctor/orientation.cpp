@@ -31,6 +31,25 @@ Tensor probabilities(const Points& cloud) {
   return softmax(orientation_net()(ctx, Var(seen)), 0).value;
 }
 
+/// How much the lowest point of the clouds moves along a direction, but for a few clouds: hardly,
+/// if a floor is below.
+double floor_moves(const std::vector<Points>& clouds, const Vec3& up) {
+  constexpr double kBelow = 0.005;  // share of the points that may be strays
+  std::vector<double> lowest;
+  for (const Points& cloud : clouds) {
+    if (cloud.empty()) continue;
+    std::vector<double> heights;
+    for (const Point& p : cloud) heights.push_back(p.cast<double>().dot(up));
+    const auto at = heights.begin() + static_cast<std::ptrdiff_t>(kBelow * double(heights.size()));
+    std::nth_element(heights.begin(), at, heights.end());
+    lowest.push_back(*at);
+  }
+  if (lowest.empty()) return 0;
+  std::sort(lowest.begin(), lowest.end());
+  const size_t tenth = lowest.size() / 10;
+  return lowest[lowest.size() - 1 - tenth] - lowest[tenth];
+}
+
 }  // namespace
 
 Vec3 direction(int index) {
@@ -109,6 +128,29 @@ Orientation OrientationVote::result(int known_up) const {
   out.turned = steps * 360 / kHeadings;
   out.turned_sure = most / total;
   return out;
+}
+
+std::optional<int> up_of_take(const std::vector<Points>& clouds, int given) {
+  constexpr double kStands = 0.9, kFloor = 0.15;  // probability; metres
+  std::array<int64_t, kUps> stands{};
+  for (const Points& cloud : clouds) {
+    OrientationVote vote;
+    vote.add(cloud);
+    const Orientation o = vote.result();
+    stands[static_cast<size_t>(o.up)] += o.up_sure >= kStands;
+  }
+  const auto most = std::max_element(stands.begin(), stands.end()) - stands.begin();
+  const double usual = floor_moves(clouds, direction(static_cast<int>(most)));
+  const int64_t often = std::max<int64_t>(2, std::ssize(clouds) / 5);
+  std::optional<int> best;
+  double least = 0;
+  for (int up = 0; up < static_cast<int>(kUps); ++up) {
+    if (stands[static_cast<size_t>(up)] < often) continue;
+    const double moves = floor_moves(clouds, direction(up));
+    if (up == given && up != most && (moves > kFloor || 2 * moves > usual)) continue;
+    if (!best || moves < least) best = up, least = moves;
+  }
+  return best;
 }
 
 }  // namespace restage

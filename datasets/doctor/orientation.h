@@ -2,6 +2,8 @@
 #pragma once
 
 #include <array>
+#include <optional>
+#include <vector>
 
 #include "nn/geometry/body.h"
 
@@ -43,5 +45,13 @@ class OrientationVote {
   std::array<double, 6> up_{};
   int clouds_ = 0;
 };
+
+/// Which direction is up in clouds from all of a take, metres, in which somebody may lie or fall:
+/// of the directions along which somebody surely stands in a fifth of the clouds, that along which
+/// the lowest point moves least, since the floor stays where it is. `given` is one of them only
+/// over a floor: there the lowest point moves by less than 0.15 m, and by less than half as much as
+/// along the direction of most clouds. Nothing if nobody stands so often along any. Who hangs from
+/// a bar or stands on the hands all the time cannot be told from somebody upright in another frame.
+std::optional<int> up_of_take(const std::vector<Points>& clouds, int given);
 
 }  // namespace restage

@@ -1,5 +1,5 @@
 #include "datasets/doctor/examine.h"
-#include "datasets/readers/non_finite.h"
+#include "datasets/readers/clouds/non_finite.h"
 
 namespace restage {
 namespace {

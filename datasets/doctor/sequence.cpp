@@ -2,6 +2,7 @@
 // are kept, and some thirty, spread over the sequence, are examined like single scans.
 #include <algorithm>
 #include <cmath>
+#include <span>
 
 #include "autograd/base/interrupt.h"
 #include "datasets/doctor/examine_detail.h"
@@ -24,9 +25,8 @@ constexpr double kFastest = 8;        // metres per second of a person's middle
 constexpr double kWalked = 0.7;       // metres: long enough to say where somebody walks
 
 std::string frame_list(const std::vector<int64_t>& frames) {
-  std::string out;
-  for (size_t i = 0; i < frames.size() && i < 5; ++i) out += cat(i > 0 ? ", " : "", frames[i]);
-  return out + (frames.size() > 5 ? ", ..." : "");
+  const std::span<const int64_t> first(frames.data(), std::min<size_t>(frames.size(), 5));
+  return joined(first) + (frames.size() > 5 ? ", ..." : "");
 }
 
 /// One of the two sizes is that of somebody else, or in another unit.
@@ -79,7 +79,7 @@ class Sequence {
       d_.say({"outliers", Weight::note,
               cat(counted(strays_, "stray point"), " in ", stray_frames_, " of ",
                   counted(looked_, "frame"), " looked at"),
-              1, "far from all others", "--fix removes them"});
+              1, "far from all others", "{fix} removes them"});
     if (flat_frames_ > 0) {
       judge_plane(d_, flattest_,
                   cat("; seen in ", flat_frames_, " of ", counted(looked_, "frame"), " looked at"));
@@ -268,7 +268,7 @@ class Sequence {
       d_.keep_every = static_cast<int>(k);
       f.what = cat("every frame is there ", k, " times: the true rate is ",
                    number(d_.fps / static_cast<double>(k)), " frames a second");
-      f.fix = "--fix OUT.h5 keeps one of each, at that rate";
+      f.fix = "{fix} OUT.h5 keeps one of each, at that rate";
     } else if (runs.size() == 1) {
       f.what = "all frames are the same";
       f.fix = "give a sequence that moves";
@@ -310,9 +310,9 @@ class Sequence {
     const bool kept = std::all_of(d_.gap.begin(), d_.gap.end(),
                                   [&](const auto& gap) { return d_.is_kept(gap.second); });
     const std::string fix =
-        kept ? "--fix puts frames without points in their place, so that the timing is right; "
+        kept ? "{fix} puts frames without points in their place, so that the timing is right; "
                "retarget fills up to a third of a second of them"
-             : "a gap of over a minute is closed by --fix; cut the sequence there";
+             : "a gap of over a minute is closed by {fix}; cut the sequence there";
     if (!empty.empty())
       d_.say({"missing frames", Weight::note,
               counted(count(true), "frame") + " without any point, before " + frame_list(empty), 1,
@@ -369,7 +369,7 @@ class Sequence {
       f.weight = Weight::note;
       f.sure = 0.9;
       f.what += " cannot be: nobody runs that fast";
-      f.fix = "give the true rate with --fps, here or to retarget";
+      f.fix = "give the true rate with {fps}, here or to retarget";
     }
     d_.say(f);
   }

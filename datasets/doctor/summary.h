@@ -4,7 +4,7 @@
 #include <array>
 #include <cstdint>
 
-#include "datasets/readers/frame_folder.h"
+#include "datasets/readers/frames/frame_folder.h"
 
 namespace restage::doctor_detail {
 

@@ -13,9 +13,4 @@ inline std::string per_cent(double share) {
   return format("%.*f %%", share < 0.1 && share > 0 ? 1 : 0, 100 * share);
 }
 
-/// "1 frame", "3 frames".
-inline std::string counted(size_t n, const std::string& what) {
-  return cat(n, " ", what, n == 1 ? "" : "s");
-}
-
 }  // namespace restage::doctor_detail

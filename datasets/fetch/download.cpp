@@ -75,7 +75,7 @@ void download(const std::string& address, const std::string& part, uint64_t byte
                     : sink.too_long ? "it is longer than the list says"
                                     : curl_easy_strerror(done);
   throw WorkError(address + ": cannot be fetched (" + why +
-                  "); check the network and run it again, or give --from FOLDER");
+                  "); check the network and run it again, or give {source} FOLDER");
 }
 
 void make_folder_of(const std::string& path) {

@@ -14,11 +14,11 @@
 #include "autograd/base/log.h"
 #include "datasets/fetch/download.h"
 #include "datasets/fetch/fetch_cmu.h"
-#include "datasets/importers/makehuman_pack.h"
+#include "datasets/importers/bodies/makehuman_pack.h"
 #include "datasets/readers/errors.h"
-#include "datasets/readers/folders.h"
-#include "datasets/readers/packed_text.h"
+#include "datasets/readers/frames/folders.h"
 #include "datasets/readers/sha256.h"
+#include "datasets/readers/text/packed_text.h"
 
 namespace restage {
 namespace {
@@ -257,7 +257,7 @@ std::vector<FetchEntry> read_fetch_list(const std::string& list) {
 FetchSummary fetch_data(const std::string& list, const std::string& out, const std::string& from) {
   const StopScope stop;
   if (!from.empty() && !fs::is_directory(from))
-    throw InputError(from, "is no folder", "give --from a data folder");
+    throw InputError(from, "is no folder", "give {source} a data folder");
   const Folders folders{out, from};
   const std::vector<Step> steps = plan(list, folders);
   std::error_code failed;

@@ -12,7 +12,7 @@
 #include "autograd/base/log.h"
 #include "datasets/fetch/download.h"
 #include "datasets/readers/errors.h"
-#include "datasets/readers/folders.h"
+#include "datasets/readers/frames/folders.h"
 #include "datasets/readers/sha256.h"
 
 namespace restage {

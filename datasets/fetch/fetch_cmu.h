@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "datasets/importers/cmu_pack.h"
+#include "datasets/importers/motions/cmu_pack.h"
 
 namespace restage {
 

@@ -10,6 +10,7 @@
 #include <limits>
 #include <type_traits>
 
+#include "autograd/base/words.h"
 #include "datasets/hdf5/detail.h"
 #include "datasets/hdf5/probe.h"
 #include "datasets/readers/byte_stream.h"
@@ -55,7 +56,7 @@ void require_memory(uint64_t values, uint64_t value_size, const std::string& whe
   throw InputError(where,
                    cat(what, " ", values, " values of ", value_size, " bytes, more than the ", most,
                        " bytes allowed"),
-                   "allow more with --max-memory");
+                   "allow more with {max-memory}");
 }
 
 /// `width`: bytes of a stored value.
@@ -136,10 +137,7 @@ Handle select_rows(hid_t space, const Shape& shape, int64_t first, int64_t count
 void set_max_memory(uint64_t bytes) { max_memory = bytes; }
 
 std::string to_string(const Shape& shape) {
-  std::string text = "[";
-  for (size_t i = 0; i < shape.size(); ++i)
-    text += (i ? ", " : "") + (shape[i] < 0 ? "*" : std::to_string(shape[i]));
-  return text + "]";
+  return cat("[", joined(shape, [](int64_t n) { return n < 0 ? "*" : std::to_string(n); }), "]");
 }
 
 // ---- Dataset -----------------------------------------------------------------------------------

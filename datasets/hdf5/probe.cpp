@@ -1,34 +1,24 @@
 #include "datasets/hdf5/probe.h"
 
-#include <fcntl.h>
 #include <hdf5.h>
-#include <sys/resource.h>
 #include <sys/stat.h>
-#include <sys/wait.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <array>
-#include <cerrno>
-#include <csignal>
 #include <cstdlib>
-#include <cstring>
 #include <ctime>
 #include <set>
 
-#include "autograd/base/error.h"
+#include "autograd/base/child_process.h"
 #include "datasets/hdf5/detail.h"
-
-// The child is a copy of a process that may have threads: only plain library calls here, no
-// exceptions, no output.
 
 namespace restage::h5 {
 namespace {
 
 // A damaged file can also make the library loop for ever. Of processor time, with as much again for
-// every 100 MB of the file; the clock may go on ten times as long.
-constexpr rlim_t kCpuSeconds = 10;
-constexpr int kShortOfMemory = 3, kDamaged = 4;    // the child's exit codes
+// every 100 MB of the file.
+constexpr unsigned kCpuSeconds = 10;
+constexpr const char *kShortOfMemory = "short of memory", *kDamaged = "damaged";  // answers
 constexpr hsize_t kReadWhole = hsize_t{64} << 20;  // bytes; larger data sets: first and last row
 constexpr hsize_t kReadInAll = hsize_t{256}
                                << 20;  // of values unpacked; after that, structure only
@@ -145,45 +135,19 @@ herr_t read_object(hid_t root, const char* name, const H5O_info_t*, void*) {
   return 0;
 }
 
-/// Bytes of address space in use; the limit comes on top, as this process may be large already.
-rlim_t address_space() {
-  char text[64] = {};
-  const int fd = ::open("/proc/self/statm", O_RDONLY | O_CLOEXEC);
-  const ssize_t n = fd < 0 ? -1 : ::read(fd, text, sizeof text - 1);
-  ::close(fd);
-  return n <= 0 ? 0
-                : std::strtoul(text, nullptr, 10) * static_cast<rlim_t>(::sysconf(_SC_PAGESIZE));
-}
-
-void limit(decltype(RLIMIT_AS) what, rlim_t soft, rlim_t hard) {
-  const rlimit both{soft, hard};
-  ::setrlimit(what, &both);
-}
-
-[[noreturn]] void child(const char* path, rlim_t seconds) {
-  const int nowhere = ::open("/dev/null", O_WRONLY);
-  if (nowhere >= 0) ::dup2(nowhere, STDERR_FILENO);
-  for (const int signal :
-       {SIGSEGV, SIGBUS, SIGFPE, SIGABRT, SIGALRM, SIGILL, SIGXCPU, SIGINT, SIGTERM})
-    std::signal(signal, SIG_DFL);
-  limit(RLIMIT_CORE, 0, 0);
-  limit(RLIMIT_CPU, seconds, seconds + 1);  // SIGXCPU first, then SIGKILL
-  if (const rlim_t used = address_space(); used > 0)
-    limit(RLIMIT_AS, used + kProbeMemory, used + kProbeMemory);
-  ::alarm(static_cast<unsigned>(10 * seconds));
-  const hid_t file = needed(H5Fopen(path, H5F_ACC_RDONLY, file_access()));
+/// The work of the child.
+std::string walk(const std::string& path) {
+  const hid_t file = needed(H5Fopen(path.c_str(), H5F_ACC_RDONLY, file_access()));
   if (file >= 0) needed(H5Ovisit(file, H5_INDEX_NAME, H5_ITER_NATIVE, read_object, nullptr));
   // Values that could not be read stop nothing: the parent gets the same answer, if it asks.
-  ::_exit(short_of_memory ? kShortOfMemory : damaged ? kDamaged : 0);
+  return short_of_memory ? kShortOfMemory : damaged ? kDamaged : "";
 }
 
-Probe outcome(int status) {
-  if (WIFEXITED(status))
-    return WEXITSTATUS(status) == 0                ? Probe::good
-           : WEXITSTATUS(status) == kShortOfMemory ? Probe::memory
-                                                   : Probe::damaged;
-  const int signal = WTERMSIG(status);
-  return signal == SIGXCPU || signal == SIGALRM ? Probe::time : Probe::damaged;
+Probe outcome(const ChildResult& child) {
+  using enum ChildResult::End;
+  if (child.end == no_end) return Probe::time;
+  if (child.end == no_memory || child.answer == kShortOfMemory) return Probe::memory;
+  return child.end == answered && child.answer.empty() ? Probe::good : Probe::damaged;
 }
 
 /// What tells one state of a file from another.
@@ -207,18 +171,8 @@ Probe probe(const std::string& path) {
   static std::set<Identity> passed;  // guarded by the Lock
   const Identity identity = identity_of(path);
   if (passed.count(identity) != 0) return Probe::good;
-  const pid_t pid = ::fork();
-  if (pid < 0)
-    throw WorkError(path + ": no process to read it in could be started (" + std::strerror(errno) +
-                    "); end some others");
-  if (pid == 0)
-    child(path.c_str(), kCpuSeconds * static_cast<rlim_t>(1 + identity[2] / 100'000'000));
-  int status = 0;
-  while (::waitpid(pid, &status, 0) < 0)
-    if (errno != EINTR)
-      throw WorkError(path + ": the process that reads it was lost (" + std::strerror(errno) +
-                      "); run it again");
-  const Probe out = outcome(status);
+  const unsigned seconds = kCpuSeconds * static_cast<unsigned>(1 + identity[2] / 100'000'000);
+  const Probe out = outcome(in_a_child({kProbeMemory, seconds}, path, [&] { return walk(path); }));
   // Of a file that changed just now, a further change may not show in its times.
   constexpr int64_t kSettled = 5;  // seconds
   if (out == Probe::good && std::time(nullptr) - identity[5] > kSettled) passed.insert(identity);

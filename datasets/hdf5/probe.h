@@ -21,7 +21,7 @@ inline constexpr unsigned long kProbeMemory = 1ul << 30;
 /// every group, object and attribute and up to 256 MiB of values (of large data sets the ends),
 /// with limits on memory and time. What it could not walk to its end is refused whole: behind the
 /// place where it stopped, nothing is known. A file that passed is not read again while its size
-/// and times stay. Call it under the Lock. WorkError: no process to be had.
+/// and times stay. Call it under the Lock. Errors as in_a_child().
 Probe probe(const std::string& path);
 
 }  // namespace restage::h5

@@ -7,15 +7,15 @@
 
 #include "autograd/base/output_check.h"
 #include "datasets/importers/batches.h"
-#include "datasets/importers/cmu.h"
+#include "datasets/importers/bodies/makehuman.h"
 #include "datasets/importers/import_detail.h"
-#include "datasets/importers/makehuman.h"
-#include "datasets/readers/array_frames.h"
+#include "datasets/importers/motions/cmu.h"
+#include "datasets/readers/clouds/mesh_io.h"
 #include "datasets/readers/errors.h"
-#include "datasets/readers/folders.h"
 #include "datasets/readers/foreign_kinds.h"
-#include "datasets/readers/hdf5_frames.h"
-#include "datasets/readers/mesh_io.h"
+#include "datasets/readers/frames/array_frames.h"
+#include "datasets/readers/frames/folders.h"
+#include "datasets/readers/frames/hdf5_frames.h"
 
 namespace restage {
 namespace {
@@ -74,7 +74,7 @@ ImportSummary import_file(const std::string& source, const std::string& out,
   if (is_pickle_name(source)) refuse_pickle(source);
   if (source.ends_with(".asf") || source.ends_with(".asf.xz"))
     throw InputError(source, "is a skeleton without a motion",
-                     "give an .amc file and this one with --asf");
+                     "give an .amc file and this one with {asf}");
   refuse_foreign_kind(source);
   throw InputError(source, "is of no kind that can be imported, by its name",
                    "give .bvh, .amc, .glb, .npz, .npy, .h5, .ply, .obj, .pcd or .xyz files, or a "
@@ -85,13 +85,13 @@ ImportSummary import_file(const std::string& source, const std::string& out,
 void check_options(const ImportOptions& options) {
   const MotionOptions& motion = options.motion;
   if (!is_split(motion.split))
-    throw InputError("", "--split '" + motion.split.substr(0, 60) + "' is unknown",
+    throw InputError("", "{split} '" + motion.split.substr(0, 60) + "' is unknown",
                      "give train, validation or test");
   const Axis up = motion.rest.up, facing = motion.rest.facing;
   if (up != Axis::automatic && facing != Axis::automatic &&
       std::abs(vector_of(up).dot(vector_of(facing))) > 0.5)
-    throw InputError("", "nobody faces up or down: --facing lies along --up",
-                     "give --facing across --up");
+    throw InputError("", "nobody faces up or down: {facing} lies along {up}",
+                     "give {facing} across {up}");
 }
 
 /// All that the options name; what is found in a folder is checked where it is found.
@@ -169,10 +169,8 @@ void ImportWriter::add(const std::string& file, const std::vector<Body>& bodies,
   summary_.motions += motions.size();
 }
 
-void refuse_all(const std::string& where, const std::string& what, const std::string& first) {
-  const size_t fix = first.rfind("; ");
-  throw InputError(where, what + ", the first: " + first.substr(0, fix),
-                   fix == std::string::npos ? "mend it" : first.substr(fix + 2));
+void refuse_all(const std::string& where, const std::string& what, const InputError& first) {
+  throw InputError(where, what + ", the first: " + first.complaint(), first.mend());
 }
 
 void check_any(const ImportSummary& summary, const std::string& source) {
@@ -180,11 +178,11 @@ void check_any(const ImportSummary& summary, const std::string& source) {
   const std::string shapes = cat(summary.shapes, " files with a shape and no motion");
   if (summary.skipped.empty())
     throw InputError(source, "holds nothing but " + shapes,
-                     "import the body model and give them as --betas");
+                     "import the body model and give them as {betas}");
   refuse_all(source,
              cat("all ", summary.skipped.size(), " files were skipped",
                  summary.shapes > 0 ? " besides " + shapes : ""),
-             summary.skipped[0]);
+             InputError::of_line(summary.skipped[0]));
 }
 
 void add_each(const std::vector<std::string>& files, ImportSummary& summary,

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "datasets/importers/motion_clip.h"
+#include "datasets/importers/motions/motion_clip.h"
 #include "datasets/importers/report.h"
 #include "datasets/readers/byte_stream.h"
 #include "datasets/schema.h"

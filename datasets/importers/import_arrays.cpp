@@ -3,16 +3,16 @@
 #include <filesystem>
 
 #include "autograd/base/output_check.h"
-#include "datasets/importers/amass.h"
+#include "datasets/importers/bodies/smpl.h"
 #include "datasets/importers/import_detail.h"
+#include "datasets/importers/motions/amass.h"
 #include "datasets/importers/scans.h"
-#include "datasets/importers/smpl.h"
-#include "datasets/readers/array_frames.h"
-#include "datasets/readers/body_parameters.h"
+#include "datasets/readers/arrays/body_parameters.h"
+#include "datasets/readers/clouds/mesh_io.h"
 #include "datasets/readers/errors.h"
-#include "datasets/readers/folders.h"
 #include "datasets/readers/foreign_kinds.h"
-#include "datasets/readers/mesh_io.h"
+#include "datasets/readers/frames/array_frames.h"
+#include "datasets/readers/frames/folders.h"
 
 namespace restage {
 namespace {
@@ -22,7 +22,7 @@ namespace fs = std::filesystem;
 void check_fps(const ImportOptions& options) {
   const double fps = options.motion.fps;
   if (fps != 0 && !(fps >= 1 && fps <= 2000))
-    throw InputError("", "--fps is out of range", "give frames per second, 1 to 2000");
+    throw InputError("", "{fps} is out of range", "give frames per second, 1 to 2000");
 }
 
 // ---- AMASS -------------------------------------------------------------------------------------
@@ -50,7 +50,7 @@ ImportSummary import_amass_files(const std::vector<std::string>& files, const st
     throw InputError(source,
                      "holds motions of a body model (as AMASS does), whose skeletons are in the "
                      "model's own file",
-                     "give your SMPL, SMPL-H or SMPL-X model with --body-model MODEL.npz");
+                     "give your SMPL, SMPL-H or SMPL-X model with {body-model} MODEL.npz");
   check_fps(options);
   check_output(out, files);
   BodyModels models(options.body_model, options.max_memory);
@@ -138,7 +138,7 @@ ImportSummary import_scan_files(const std::string& source, const std::string& ou
   if (sequences.empty() && summary.skipped.size() == 1) throw Error(summary.skipped[0], 2);
   if (sequences.empty() && !summary.skipped.empty())
     refuse_all(source, cat("holds nothing to import, ", summary.skipped.size(), " were skipped"),
-               summary.skipped[0]);
+               InputError::of_line(summary.skipped[0]));
   if (sequences.empty())
     throw InputError(source, "holds nothing to import",
                      "give a data folder, BVH files, AMASS motions, a body model or scans");
@@ -174,11 +174,11 @@ ImportSummary import_npz(const std::string& source, const std::string& out,
   const std::string folder = absolute_path(source).parent_path().string();
   if (is_smpl_model(file)) return import_model(source, out, options);
   if (!options.betas.empty())
-    throw InputError(source, "is no body model, to which --betas belongs", "leave --betas out");
+    throw InputError(source, "is no body model, to which {betas} belongs", "leave {betas} out");
   if (is_amass_motion(file)) return import_amass_files({source}, source, folder, out, options);
   if (is_amass_shape(file))
     throw InputError(source, "holds a body's shape and no motion",
-                     "import the body model and give this file as --betas");
+                     "import the body model and give this file as {betas}");
   find_cloud(file);  // refuses half a motion by what is missing
   return import_scan_files(source, out, options);
 }

@@ -47,9 +47,9 @@ bool holds_scans(const std::string& path);
 bool is_pickle_name(const std::string& path);
 [[noreturn]] void refuse_pickle(const std::string& path);
 
-/// InputError for several files, with the reason and the remedy of the first: its error's text.
+/// InputError for several files, with the reason and the remedy of the first.
 [[noreturn]] void refuse_all(const std::string& where, const std::string& what,
-                             const std::string& first);
+                             const InputError& first);
 /// Of folders: InputError with the first file's reason if nothing came of any of them.
 void check_any(const ImportSummary& summary, const std::string& source);
 /// Calls `add` for each file; of several, those that it throws an InputError for are skipped and

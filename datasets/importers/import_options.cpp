@@ -34,22 +34,22 @@ std::vector<Given> all_of(const ImportOptions& options) {
   const ImportOptions none;
   const RestOptions& rest = motion.rest;
   return {
-      {"--license", options.license != none.license, files, "files whose licence is not known"},
-      {"--subject", !motion.subject.empty(), motions, "motions"},
-      {"--subjects", !options.subjects.empty(), motions, "motions"},
-      {"--split", motion.split != none.motion.split, bodies, "motions and bodies"},
-      {"--scale", motion.scale > 0, scaled, of_scaled},
-      {"--fps", motion.fps > 0, timed, of_timed},
-      {"--up", rest.up != Axis::automatic, turned, of_turned},
-      {"--facing", rest.facing != Axis::automatic, recordings, of_recordings},
-      {"--rest-frame", rest.frame >= 0, recordings, of_recordings},
-      {"--drop-leading", motion.drop_leading >= 0, recordings, of_recordings},
-      {"--bones", !motion.profile.empty(), moving, of_moving},
-      {"--asf", !options.asf.empty(), {amc}, "AMC recordings"},
-      {"--clip", !options.clip.empty(), {character}, "glTF characters"},
-      {"--body-model", !options.body_model.empty(), {amass}, "AMASS motions"},
-      {"--betas", !options.betas.empty(), {body_model}, "body models"},
-      {"--garment", !options.garment.empty(), {data_folder}, "data folders"},
+      {"{license}", options.license != none.license, files, "files whose licence is not known"},
+      {"{subject}", !motion.subject.empty(), motions, "motions"},
+      {"{subjects}", !options.subjects.empty(), motions, "motions"},
+      {"{split}", motion.split != none.motion.split, bodies, "motions and bodies"},
+      {"{scale}", motion.scale > 0, scaled, of_scaled},
+      {"{fps}", motion.fps > 0, timed, of_timed},
+      {"{up}", rest.up != Axis::automatic, turned, of_turned},
+      {"{facing}", rest.facing != Axis::automatic, recordings, of_recordings},
+      {"{rest-frame}", rest.frame >= 0, recordings, of_recordings},
+      {"{drop-leading}", motion.drop_leading >= 0, recordings, of_recordings},
+      {"{bones}", !motion.profile.empty(), moving, of_moving},
+      {"{asf}", !options.asf.empty(), {amc}, "AMC recordings"},
+      {"{clip}", !options.clip.empty(), {character}, "glTF characters"},
+      {"{body-model}", !options.body_model.empty(), {amass}, "AMASS motions"},
+      {"{betas}", !options.betas.empty(), {body_model}, "body models"},
+      {"{garment}", !options.garment.empty(), {data_folder}, "data folders"},
   };
 }
 
@@ -75,11 +75,11 @@ std::map<std::string, std::string> subjects_of(const std::vector<std::string>& f
   try {
     wanted = std::regex(expression);
   } catch (const std::regex_error& error) {
-    throw InputError("", "--subjects '" + expression + "' is no regular expression",
+    throw InputError("", "{subjects} '" + expression + "' is no regular expression",
                      "put who moves into a group, as in '([^/]+)/.*' for folders of people");
   }
   if (wanted.mark_count() == 0)
-    throw InputError("", "--subjects '" + expression + "' has no group",
+    throw InputError("", "{subjects} '" + expression + "' has no group",
                      "put who moves into one, as in '([^/]+)/.*' for folders of people");
   std::vector<std::string> strangers;
   for (const std::string& file : files) {
@@ -95,7 +95,7 @@ std::map<std::string, std::string> subjects_of(const std::vector<std::string>& f
   if (!strangers.empty())
     throw InputError(root,
                      cat("does not name who moves in ", strangers.size(), " of ", files.size(),
-                         " files by --subjects, the first being ", strangers[0].substr(0, 120)),
+                         " files by {subjects}, the first being ", strangers[0].substr(0, 120)),
                      "widen the expression, or move those files away");
   return out;
 }

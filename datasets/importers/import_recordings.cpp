@@ -6,13 +6,13 @@
 
 #include "autograd/base/error.h"
 #include "autograd/base/output_check.h"
-#include "datasets/importers/amc.h"
-#include "datasets/importers/bvh.h"
-#include "datasets/importers/gltf_character.h"
 #include "datasets/importers/import_detail.h"
-#include "datasets/readers/packed_text.h"
-#include "datasets/readers/text.h"
-#include "datasets/readers/word_lines.h"
+#include "datasets/importers/motions/amc.h"
+#include "datasets/importers/motions/bvh.h"
+#include "datasets/importers/rigs/gltf_character.h"
+#include "datasets/readers/text/packed_text.h"
+#include "datasets/readers/text/text.h"
+#include "datasets/readers/text/word_lines.h"
 
 namespace restage {
 namespace {

@@ -12,14 +12,14 @@
 #include "datasets/doctor/examine.h"
 #include "datasets/doctor/orientation_model.h"
 #include "datasets/doctor/shape.h"
-#include "datasets/readers/array_frames.h"
+#include "datasets/readers/clouds/mesh_io.h"
+#include "datasets/readers/clouds/point_path.h"
 #include "datasets/readers/errors.h"
-#include "datasets/readers/folders.h"
 #include "datasets/readers/foreign_kinds.h"
-#include "datasets/readers/frame_folder.h"
-#include "datasets/readers/hdf5_frames.h"
-#include "datasets/readers/mesh_io.h"
-#include "datasets/readers/point_path.h"
+#include "datasets/readers/frames/array_frames.h"
+#include "datasets/readers/frames/folders.h"
+#include "datasets/readers/frames/frame_folder.h"
+#include "datasets/readers/frames/hdf5_frames.h"
 #include "nn/geometry/box.h"
 
 namespace restage {
@@ -163,7 +163,7 @@ void convert(Frame& frame, const Eigen::Matrix3f& to_ours) {
     p = to_ours * p;
     if (!p.allFinite())
       throw InputError(frame.source, "is too large for that scale",
-                       "give metres a unit as --scale");
+                       "give metres a unit as {scale}");
   }
 }
 
@@ -186,12 +186,6 @@ size_t different_points(const Points& points) {
   return different.size();
 }
 
-/// What is wrong, without how to mend it.
-std::string cause_of(const InputError& fault) {
-  const std::string text = fault.what();
-  return text.substr(0, text.rfind("; "));
-}
-
 /// Writes frames at our rate. Where one shows nobody (too few points), the nearest that do stand in
 /// its place, up to a second long.
 class HoldingWriter {
@@ -204,7 +198,7 @@ class HoldingWriter {
     if (different < kFewest) {
       if (missing_ == 0) {
         fault_ = frame.fault;
-        first_ = fault_ ? cause_of(*fault_)
+        first_ = fault_ ? fault_->complaint()
                         : cat(frame.source, ": has only ", different, " different points");
       }
       ++missing_;
@@ -228,7 +222,7 @@ class HoldingWriter {
     out_.end_sequence();
     report.fact("points", fewest_ == most_ ? std::to_string(most_) : cat(fewest_, " to ", most_));
     if (held_ > 0)
-      report.remark(cat(held_, held_ == 1 ? " frame shows" : " frames show",
+      report.remark(cat(counted(held_, "frame shows", "frames show"),
                         " too little (fewer than 64 points): the nearest in time ",
                         held_ == 1 ? "stands" : "stand", " there"));
   }
@@ -257,7 +251,7 @@ class HoldingWriter {
 void check_person(const Frame& frame, double given_scale, ImportReport& report) {
   // Arrays and tables hold anything; meshes and their kin hold surfaces.
   if (!is_mesh_name(frame.source) && is_path(frame.points))
-    throw InputError(frame.source, kPath, cat(kPathFix, ", or --force to take it as it is"));
+    throw InputError(frame.source, kPath, cat(kPathFix, ", or {force} to take it as it is"));
   constexpr double kLeast = 0.1, kMost = 5;
   const Box box = box_of(frame.points);
   const double width = (box.max().cast<double>() - box.min().cast<double>()).norm();
@@ -267,26 +261,26 @@ void check_person(const Frame& frame, double given_scale, ImportReport& report) 
   const bool other = guess.unit.metres != 1 && guess.sure > 0.5;
   if (metres > kLeast && metres < kMost) {
     if (!(given_scale > 0) && other && guess.sure > 0.9)
-      report.remark(format("a unit seems to be %.6g m: if so, give --scale %.6g", guess.unit.metres,
+      report.remark(format("a unit seems to be %.6g m: if so, give {scale} %.6g", guess.unit.metres,
                            guess.unit.metres));
     return;
   }
   if (given_scale > 0)
     throw InputError(
         frame.source,
-        format("is %.3g m large with --scale %.6g, which no person is", width * given_scale,
+        format("is %.3g m large with {scale} %.6g, which no person is", width * given_scale,
                given_scale),
-        "give the true metres a unit, leave --scale out to hear what it seems, or --force");
+        "give the true metres a unit, leave {scale} out to hear what it seems, or {force}");
   if (other)
     throw InputError(
         frame.source,
         format("is %.3g units large, which no person is in metres; a unit seems to "
                "be %.6g m",
                width, guess.unit.metres),
-        format("give --scale %.6g, or --force to take it as it is", guess.unit.metres));
+        format("give {scale} %.6g, or {force} to take it as it is", guess.unit.metres));
   throw InputError(frame.source,
                    format("is %.3g units large, which no person is in any unit", width),
-                   "give scans of one person, metres a unit as --scale, or --force");
+                   "give scans of one person, metres a unit as {scale}, or {force}");
 }
 
 std::string size_fact(const Points& points) {
@@ -336,15 +330,15 @@ int64_t import_scans(const ScanSequence& sequence, const MotionOptions& options,
   const Clock clock(source->frames(), fps);
   report.file = sequence.name;
   report.fact("rate", rate_fact(fps,
-                                options.fps > 0 ? "--fps"
+                                options.fps > 0 ? "{fps}"
                                 : stated        ? "the file's"
-                                                : "taken for granted: --fps",
+                                                : "taken for granted: {fps}",
                                 source->frames(), clock));
-  report.fact("scale", options.scale > 0 ? format("%.6g m a unit (--scale)", scale)
-                                         : "metres (taken for granted: --scale)");
+  report.fact("scale", options.scale > 0 ? format("%.6g m a unit ({scale})", scale)
+                                         : "metres (taken for granted: {scale})");
   const bool given_up = options.rest.up != Axis::automatic;
   const Axis up = given_up ? options.rest.up : Axis::y;
-  report.fact("up", to_string(up) + (given_up ? " (--up)" : " (taken for granted: --up)"));
+  report.fact("up", to_string(up) + (given_up ? " ({up})" : " (taken for granted: {up})"));
   const Eigen::Matrix3f to_ours = (scale * upright(up)).cast<float>();
 
   HoldingWriter writer(out, sequence.name);
@@ -371,8 +365,8 @@ int64_t import_scans(const ScanSequence& sequence, const MotionOptions& options,
     writer.push(frame, different);
   }
   if (left_out > 0)
-    report.remark(cat("left out ", left_out, left_out == 1 ? " point" : " points",
-                      " whose coordinates are NaN or infinite"));
+    report.remark(
+        cat("left out ", counted(left_out, "point"), " whose coordinates are NaN or infinite"));
   for (const std::string& remark : source->remarks()) report.remark(remark);
   if (!faults.empty()) report.remark(remark_on_faults(faults));
   writer.finish(report);

@@ -6,9 +6,9 @@
 #include <string>
 #include <vector>
 
-#include "datasets/importers/motion_clip.h"
+#include "datasets/importers/motions/motion_clip.h"
 #include "datasets/readers/byte_stream.h"
-#include "datasets/readers/frame_names.h"
+#include "datasets/readers/frames/frame_names.h"
 #include "datasets/schema.h"
 
 namespace restage {

@@ -56,11 +56,8 @@ struct Stamp {
 
 /// "" without a home.
 std::string cache_file() {
-  const char* cache = std::getenv("XDG_CACHE_HOME");
-  const char* home = std::getenv("HOME");
-  if (cache != nullptr && cache[0] == '/') return std::string(cache) + "/restage/sums";
-  if (home != nullptr && home[0] == '/') return std::string(home) + "/.cache/restage/sums";
-  return "";
+  const std::string folder = user_cache();
+  return folder.empty() ? "" : folder + "/sums";
 }
 
 /// A line of the cache: "CHECKSUM SHA256 STAMP PATH", the first of all that follows it.
@@ -115,6 +112,14 @@ void keep(const std::string& cache, Entry fresh) {
 }
 
 }  // namespace
+
+std::string user_cache() {
+  const char* cache = std::getenv("XDG_CACHE_HOME");
+  const char* home = std::getenv("HOME");
+  if (cache != nullptr && cache[0] == '/') return std::string(cache) + "/restage";
+  if (home != nullptr && home[0] == '/') return std::string(home) + "/.cache/restage";
+  return "";
+}
 
 std::string kept_sha256(const std::string& path) {
   return kept_sum(path, "", [&] { return sha256_of_file(path); });

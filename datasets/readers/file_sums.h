@@ -6,6 +6,10 @@
 
 namespace restage {
 
+/// The user's folder for what can be made again: $XDG_CACHE_HOME/restage, else ~/.cache/restage; ""
+/// without a home. It may not be there yet.
+std::string user_cache();
+
 /// The SHA-256 of a file. That of a file of 8 MiB or more is kept in the user's cache folder
 /// ($XDG_CACHE_HOME/restage/sums, else ~/.cache/restage/sums), and taken from there as long as the
 /// file's path, device, inode, size and both times (of content and of inode) are the same. A file

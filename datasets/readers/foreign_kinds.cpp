@@ -5,7 +5,7 @@
 #include "autograd/base/atomic_file.h"
 #include "datasets/readers/byte_stream.h"
 #include "datasets/readers/errors.h"
-#include "datasets/readers/text.h"
+#include "datasets/readers/text/text.h"
 
 namespace restage {
 namespace {
@@ -21,7 +21,8 @@ struct ForeignKind {
 using namespace std::string_view_literals;
 
 const ForeignKind kForeignKinds[] = {
-    // Text of FBX begins with a comment. FBX that is called so is read (datasets/readers/fbx.h).
+    // Text of FBX begins with a comment. FBX that is called so is read
+    // (datasets/readers/fbx/fbx.h).
     {{},
      {"Kaydara FBX Binary", "; FBX"},
      "is FBX under another name",

@@ -6,6 +6,7 @@
 
 #include "autograd/base/parallel_each.h"
 #include "nn/geometry/box.h"
+#include "nn/geometry/normals.h"
 
 namespace restage {
 namespace {
@@ -15,18 +16,6 @@ double hairiness(const Point& direction) {
   const double up = direction.y(), ahead = direction.z();
   const double line = up - 0.9 * ahead - 0.05;  // from the forehead down behind the ears
   return std::clamp(3.0 * line, 0.0, 1.0);
-}
-
-Points normals(const Mesh& mesh) {
-  Points out(mesh.vertices.size(), Point::Zero());
-  for (const Triangle& f : mesh.faces) {
-    const auto at = [&](size_t k) { return mesh.vertices[f[k]]; };
-    const Point n = (at(1) - at(0)).cross(at(2) - at(0));
-    for (const int32_t v : f) out[v] += n;
-  }
-  for (Point& n : out)
-    if (n.squaredNorm() > 0) n.normalize();
-  return out;
 }
 
 }  // namespace
@@ -98,7 +87,7 @@ Body dressed(const Body& body, const RngKey& key) {
   Body out = body;
   Rng rng(key);
   const Outfit outfit = draw_outfit(rng);
-  const Points outwards = normals(body.rest);
+  const Points outwards = vertex_normals<Point>(body.rest.vertices, body.rest.faces, Point::Zero());
   for (size_t v = 0; v < outwards.size(); ++v) {
     const float* weights = body.weights.data() + v * kJoints;
     out.rest.vertices[v] += outfit.thickness(weights, body.rest.vertices[v]) * outwards[v];

@@ -3,7 +3,7 @@
 #include <array>
 #include <cmath>
 
-#include "datasets/readers/non_finite.h"
+#include "datasets/readers/clouds/non_finite.h"
 
 namespace restage {
 namespace {

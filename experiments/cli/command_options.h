@@ -1,9 +1,11 @@
-// What a command line may hold: the options of a command, read into variables. The only door to
-// CLI11, whose templates take seconds to compile: only command_options.cpp and program.cpp include
-// it.
+// What a command line may hold: the options of a command, read into variables. They are the one
+// table of options: help pages, completion, and Python's signatures and stubs come from them
+// (Program::tree()). The only door to CLI11, whose templates take seconds to compile: only
+// command_options.cpp and program.cpp include it.
 #pragma once
 
 #include <functional>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -14,11 +16,24 @@ class Option;
 
 namespace restage::cli {
 
+/// What an option is given. A flag is given nothing.
+enum class ValueKind { flag, text, whole, number, number_or_unit };
+
+/// What is known of an option beside what the parser keeps.
+struct OptionFacts {
+  std::string help;  ///< without its default
+  ValueKind kind = ValueKind::flag;
+  std::string default_value;             ///< as one would write it; empty: none
+  std::vector<std::string> suggestions;  ///< Option::suggest()
+  std::vector<std::string> formerly;     ///< Option::formerly()
+};
+using OptionTable = std::map<const CLI::Option*, OptionFacts>;
+
 /// One option of a command. The setters can be chained; a fault is told when the arguments are
 /// read.
 class Option {
  public:
-  explicit Option(CLI::Option* option) : option_(option) {}
+  Option(CLI::Option* option, OptionFacts& facts) : option_(option), facts_(&facts) {}
 
   Option& required();
   /// Takes one value a time: `--size a=1 --size b=2`, so that words behind the value stay words of
@@ -27,8 +42,8 @@ class Option {
   Option& separated_by(char separator);
   /// Exactly so many values.
   Option& count(int values);
-  /// The help page shows the variable's value of now as the default.
-  Option& show_default();
+  /// An older name ("--input"), which goes on working; whoever uses it is told the new one.
+  Option& formerly(const std::string& name);
   Option& one_of(std::vector<std::string> words);
   /// Words that shells offer beside files for an option without a name.
   Option& suggest(std::vector<std::string> words);
@@ -39,31 +54,34 @@ class Option {
 
  private:
   CLI::Option* option_;
+  OptionFacts* facts_;
 };
-
-/// What suggest() was given, else nothing.
-const std::vector<std::string>& suggestions(const CLI::Option* option);
 
 /// The arguments of a command or of a group of commands; refers to what Program owns.
 class CommandOptions {
  public:
-  explicit CommandOptions(CLI::App& app) : app_(&app) {}
+  CommandOptions(CLI::App& app, OptionTable& table) : app_(&app), table_(&table) {}
 
-  /// Reads `names` ("--out", or "FILE" for a word without a name) into `value`, which lives as long
-  /// as the program. T: std::string, bool, double, int, int64_t, uint64_t, a vector of them, or
-  /// std::optional of one (command_options.cpp lists them).
+  /// Reads `names` ("--out", "FILE" for a word without a name, or "--source,SOURCE" for both) into
+  /// `value`, which lives as long as the program. T: std::string, double, int, int64_t, uint64_t, a
+  /// vector of them, or std::optional of one (command_options.cpp lists them). The help page ends
+  /// with the value of now as the default, where `help` names none: "(default: ...)".
   template <class T>
   Option add_option(const std::string& names, T& value, const std::string& help);
   /// Is true when the option is given; "!--no-x" makes `value` false.
   Option add_flag(const std::string& names, bool& value, const std::string& help);
-  /// Hands the value over as text; `read` may throw.
+  /// Hands the value over as text; `read` may throw. The default stands in `help`.
   Option add_text(const std::string& name, std::function<void(const std::string&)> read,
-                  const std::string& help);
+                  const std::string& help, ValueKind kind = ValueKind::text);
 
   CLI::App& app() const { return *app_; }
+  OptionTable& table() const { return *table_; }
 
  private:
+  Option keep(CLI::Option* option, OptionFacts facts);
+
   CLI::App* app_;
+  OptionTable* table_;
 };
 
 }  // namespace restage::cli

@@ -20,7 +20,6 @@ void add_commands(Program& program) {
   add_compare(program);
   add_report(program);
   add_view(program);
-  add_render(program);
   add_info(program);
   add_weights(program);
   add_doctor(program);

@@ -24,7 +24,6 @@ void add_doctor(Program& program);
 int run_doctor_self(const Common& common);  // doctor --self
 void add_eval(Program& program);
 void add_info(Program& program);
-void add_render(Program& program);
 void add_replay(Program& program);
 void add_report(Program& program);
 void add_reproduce(Program& program);

@@ -1,10 +1,14 @@
 #include "experiments/cli/completion.h"
 
+#include <algorithm>
 #include <functional>
 #include <memory>
+#include <set>
 
+#include "autograd/base/words.h"
 #include "experiments/cli/commands.h"
 #include "experiments/cli/output.h"
+#include "experiments/cli/perform/retarget.h"
 
 namespace restage::cli {
 namespace {
@@ -16,11 +20,7 @@ std::string shell_word(const std::string& text) {
   return out + "'";
 }
 
-std::string joined(const std::vector<std::string>& words) {
-  std::string out;
-  for (const std::string& word : words) out += (out.empty() ? "" : " ") + word;
-  return out;
-}
+std::string in_a_row(const std::vector<std::string>& words) { return joined(words, {}, " "); }
 
 /// Calls visit(words, command) for the program (no words) and all commands ("data import").
 void each_command(const CommandTree& of, const std::string& words,
@@ -64,16 +64,17 @@ std::string for_each_value(const CommandTree& command,
   for (const CommandTree::Option& option : command.options) {
     if (option.value && option.choices.empty()) any += (any.empty() ? "" : "|") + option.name;
     if (!option.choices.empty())
-      out += "        " + option.name + ") " + choose(joined(option.choices)) + "; return ;;\n";
+      out += "        " + option.name + ") " + choose(in_a_row(option.choices)) + "; return ;;\n";
   }
   if (!any.empty()) out += "        " + any + ") " + files + "; return ;;\n";
   return out + "      esac\n";
 }
 
 std::string script_of(const std::string& shell, const CommandTree& program) {
-  return shell == "bash"  ? bash_completion(program)
-         : shell == "zsh" ? zsh_completion(program)
-                          : fish_completion(program);
+  return shell == "bash"   ? bash_completion(program)
+         : shell == "zsh"  ? zsh_completion(program)
+         : shell == "fish" ? fish_completion(program)
+                           : python_options(program);
 }
 
 }  // namespace
@@ -82,7 +83,7 @@ std::string bash_completion(const CommandTree& program) {
   // Names may hold spaces.
   const auto files_and = [](const std::vector<std::string>& words) {
     const std::string known =
-        words.empty() ? "" : "compgen -W '" + joined(words) + "' -- \"$current\"; ";
+        words.empty() ? "" : "compgen -W '" + in_a_row(words) + "' -- \"$current\"; ";
     return "mapfile -t COMPREPLY < <(" + known + "compgen -f -- \"$current\")";
   };
   const auto only = [](const std::string& words) {
@@ -93,8 +94,8 @@ std::string bash_completion(const CommandTree& program) {
     for (const auto& sub : command.commands) commands.push_back(sub.name);
     for (const auto& option : command.options) options.push_back(option.name);
     return for_each_value(command, only, files_and({})) + "      if [[ $current == -* ]]; then " +
-           only(joined(options)) + "\n      else " +
-           (commands.empty() ? files_and(command.words) : only(joined(commands))) + "; fi\n";
+           only(in_a_row(options)) + "\n      else " +
+           (commands.empty() ? files_and(command.words) : only(in_a_row(commands))) + "; fi\n";
   };
   return "# restage completion bash > /usr/share/bash-completion/completions/restage\n"
          "_restage() {\n"
@@ -129,7 +130,7 @@ std::string zsh_completion(const CommandTree& program) {
                          out += " )\n      options=(";
                          for (const auto& option : command.options)
                            out += described(option.name, option.help);
-                         return out + " )\n      known=(" + joined(command.words) + ")\n";
+                         return out + " )\n      known=(" + in_a_row(command.words) + ")\n";
                        }) +
          "  if [[ ${words[CURRENT]} == -* ]]; then _describe option options\n"
          "  elif (( $#commands )); then _describe command commands\n"
@@ -158,16 +159,83 @@ std::string fish_completion(const CommandTree& program) {
              " -a " + sub.name + " -d " + shell_word(sub.help) + "\n";
     if (!command.words.empty())
       out += "complete -c restage -n " + shell_word(at) + " -a " +
-             shell_word(joined(command.words)) + "\n";
+             shell_word(in_a_row(command.words)) + "\n";
     for (const auto& option : command.options) {
       out += "complete -c restage -n " + shell_word(at) + " -l " + option.name.substr(2) + " -d " +
              shell_word(option.help);
       if (option.value) out += " -r";
-      if (!option.choices.empty()) out += " -f -a " + shell_word(joined(option.choices));
+      if (!option.choices.empty()) out += " -f -a " + shell_word(in_a_row(option.choices));
       out += "\n";
     }
   });
   return out;
+}
+
+bool is_for_shells(const std::string& name) {
+  for (const char* other : {"json", "quiet", "help", "version", "threads"})
+    if (name == other) return true;
+  return false;
+}
+
+CommandTree system_options() {
+  Program program;
+  RetargetCommand c;
+  add_live_options(program.add("System", "", "", [] { return 0; }), c);
+  return program.tree().commands.at(0);
+}
+
+namespace {
+
+std::string python_type(const CommandTree::Option& option) {
+  std::string one = "bool";
+  if (option.kind == ValueKind::text) one = "Text";
+  if (option.kind == ValueKind::whole) one = "int";
+  if (option.kind == ValueKind::number) one = "float";
+  if (option.kind == ValueKind::number_or_unit) one = "float | str";
+  if (!option.choices.empty()) {
+    one.clear();
+    for (const std::string& choice : option.choices)
+      one += (one.empty() ? "Literal[\"" : "\", \"") + choice;
+    one += "\"]";
+  }
+  if (option.several) one += " | Sequence[" + one + "]";
+  return option.kind == ValueKind::flag ? one : one + " | None";
+}
+
+/// The options of a command, but for those that its function in Python names itself.
+std::string typed_dict(const std::string& name, const CommandTree& command,
+                       const std::set<std::string>& own) {
+  std::string out = "\nclass " + name + "(TypedDict, total=False):\n";
+  for (const CommandTree::Option& option : command.options) {
+    std::string key = option.name.substr(2);
+    if (own.count(key) > 0 || is_for_shells(key)) continue;
+    const bool negative = option.kind == ValueKind::flag && key.starts_with("no-");
+    if (negative) key = key.substr(3);
+    std::replace(key.begin(), key.end(), '-', '_');
+    out += "    " + key + ": " + python_type(option) + "  # " + (negative ? "False: " : "") +
+           option.help + "\n";
+  }
+  return out;
+}
+
+const CommandTree& command_called(const CommandTree& program, const std::string& name) {
+  return *std::find_if(program.commands.begin(), program.commands.end(),
+                       [&](const CommandTree& command) { return command.name == name; });
+}
+
+}  // namespace
+
+std::string python_options(const CommandTree& program) {
+  return "# Made by 'restage completion python': what the functions take as keywords, which are "
+         "the "
+         "program's options\n# with _ for -.\n"
+         "import os\nfrom typing import Literal, Sequence, TypedDict, Union\n\n"
+         "Text = Union[str, bytes, os.PathLike[str], os.PathLike[bytes]]\n" +
+         typed_dict("RetargetOptions", command_called(program, "retarget"),
+                    {"source", "target", "weights", "out"}) +
+         typed_dict("SystemOptions", system_options(), {"target", "weights"}) +
+         typed_dict("DoctorOptions", command_called(program, "doctor"), {"source"}) +
+         typed_dict("TrainOptions", command_called(program, "train"), {});
 }
 
 void add_completion(Program& program) {
@@ -176,15 +244,18 @@ void add_completion(Program& program) {
       program.add("completion", "print a script that completes command lines in a shell",
                   "restage completion bash > ~/.local/share/bash-completion/completions/restage\n"
                   "restage completion zsh > ~/.zfunc/_restage\n"
-                  "restage completion fish > ~/.config/fish/completions/restage.fish",
+                  "restage completion fish > ~/.config/fish/completions/restage.fish\n"
+                  "restage completion python > python/restage/_options.pyi",
                   [&program, shell] {
                     const std::string script = script_of(*shell, program.tree());
                     print(program.common().json, {{"shell", *shell}, {"script", script}}, script);
                     return 0;
                   });
-  command.add_option("SHELL", *shell, "bash, zsh or fish")
+  command
+      .add_option("SHELL", *shell,
+                  "bash, zsh or fish; python: a stub of the options of its functions")
       .required()
-      .one_of({"bash", "zsh", "fish"});
+      .one_of({"bash", "zsh", "fish", "python"});
 }
 
 }  // namespace restage::cli

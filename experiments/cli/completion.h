@@ -4,14 +4,20 @@
 #include <string>
 #include <vector>
 
+#include "experiments/cli/command_options.h"
+
 namespace restage::cli {
 
 /// A command with its options and, of a group, its commands.
 struct CommandTree {
   struct Option {
-    std::string name, help;            ///< "--out"
-    bool value = false;                ///< whether a word follows
-    std::vector<std::string> choices;  ///< that this word may be; empty: any, such as a file
+    std::string name, help;                  ///< "--out"
+    bool value = false;                      ///< whether a word follows
+    std::vector<std::string> choices;        ///< that this word may be; empty: any, such as a file
+    ValueKind kind = ValueKind::flag;        ///< of the word
+    std::string default_value;               ///< OptionFacts::default_value
+    bool required = false, several = false;  ///< has to be given; may be given more than once
+    std::vector<std::string> formerly;       ///< OptionFacts::formerly
   };
   std::string name, help;
   std::vector<Option> options;
@@ -23,5 +29,11 @@ struct CommandTree {
 std::string bash_completion(const CommandTree& program);
 std::string zsh_completion(const CommandTree& program);
 std::string fish_completion(const CommandTree& program);
+/// The options of Python's functions as a stub (python/restage/_options.pyi).
+std::string python_options(const CommandTree& program);
+/// What Python's System takes, as a command.
+CommandTree system_options();
+/// Options of a shell, which mean nothing to a caller in Python.
+bool is_for_shells(const std::string& name);
 
 }  // namespace restage::cli

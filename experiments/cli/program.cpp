@@ -24,8 +24,9 @@
 #include "autograd/base/log.h"
 #include "autograd/base/nearest.h"
 #include "autograd/base/parallel.h"
+#include "autograd/base/words.h"
 #include "datasets/hdf5/file.h"
-#include "datasets/readers/text.h"
+#include "datasets/readers/text/text.h"
 #include "experiments/cli/commands.h"
 #include "experiments/cli/output.h"
 
@@ -46,9 +47,7 @@ uint64_t parse_memory(const std::string& text) {
       {"k", 1e3},  {"m", 1e6},      {"g", 1e9}};
   double value = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  std::string unit(end, text.data() + text.size());
-  for (char& c : unit) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  const auto factor = units.find(unit);
+  const auto factor = units.find(lower_case({end, text.data() + text.size()}));
   const double bytes = factor == units.end() ? 0 : value * factor->second;
   if (error != std::errc() || !(bytes >= 1e6 && bytes <= 1e15))
     throw InputError("", "--max-memory '" + text.substr(0, 40) + "' is no size",
@@ -73,12 +72,48 @@ std::string words_of(const CLI::App& command) {
   return (group == nullptr ? "" : words_of(*group) + " ") + command.get_name();
 }
 
-/// The command's own options before those of every command, which were added first.
+/// What add_option() and add_flag() know of it; nothing of those that the parser adds (--help).
+const OptionFacts& facts_of(const OptionTable& table, const CLI::Option* option) {
+  static const OptionFacts nothing;
+  const auto found = table.find(option);
+  return found == table.end() ? nothing : found->second;
+}
+
+/// What may be proposed for an option that is not known: the command's own before those of every
+/// command, which were added first. What switches checks off is never proposed.
 std::vector<std::string> option_names(const CLI::App& command) {
   std::vector<std::string> names;
   for (const CLI::Option* option : command.get_options())
-    for (const std::string& name : option->get_lnames()) names.insert(names.begin(), "--" + name);
+    for (const std::string& name : option->get_lnames())
+      if (name != "force") names.insert(names.begin(), "--" + name);
   return names;
+}
+
+/// The command that the words name, as far as they go.
+const CLI::App* command_named(const CLI::App* app, std::span<const std::string> words) {
+  for (const std::string& word : words)
+    for (const CLI::App* sub : app->get_subcommands([](const CLI::App*) { return true; }))
+      if (sub->get_name() == word) {
+        app = sub;
+        break;
+      }
+  return app;
+}
+
+/// Writes older names of options as they are called now; a remark on each.
+std::vector<std::string> rename_options(const CLI::App& app, const OptionTable& table,
+                                        std::vector<std::string>& words) {
+  std::vector<std::string> remarks;
+  const CLI::App* command = command_named(&app, words);
+  for (const CLI::Option* option : command->get_options())
+    for (const std::string& old : facts_of(table, option).formerly)
+      for (std::string& word : words) {
+        if (word != old && !word.starts_with(old + "=")) continue;
+        word.replace(0, old.size(), option->get_name());
+        remarks.push_back(old + " of '" + words_of(*command) + "' is called " + option->get_name() +
+                          " now");
+      }
+  return remarks;
 }
 
 std::vector<std::string> command_names(const CLI::App& command) {
@@ -111,19 +146,23 @@ std::vector<std::string> choices_of(const std::string& type) {
   return out;
 }
 
-CommandTree described(const CLI::App& command) {
-  CommandTree out{command.get_name(), command.get_description(), {}, {}, {}};
+CommandTree described(const CLI::App& command, const OptionTable& table) {
+  CommandTree out;
+  out.name = command.get_name();
+  out.help = command.get_description();
   for (const CLI::Option* option : command.get_options()) {
+    const OptionFacts& facts = facts_of(table, option);
     if (option->get_positional())
-      for (const auto& words : {choices_of(option->get_type_name()), suggestions(option)})
+      for (const auto& words : {choices_of(option->get_type_name()), facts.suggestions})
         out.words.insert(out.words.end(), words.begin(), words.end());
     for (const std::string& name : option->get_lnames())
-      out.options.push_back({"--" + name, option->get_description(),
-                             option->get_items_expected_max() > 0,
-                             choices_of(option->get_type_name())});
+      out.options.push_back(
+          {"--" + name, option->get_description(), option->get_items_expected_max() > 0,
+           choices_of(option->get_type_name()), facts.kind, facts.default_value,
+           option->get_required(), option->get_items_expected_max() > 1, facts.formerly});
   }
   for (const CLI::App* sub : command.get_subcommands([](const CLI::App*) { return true; }))
-    if (!sub->get_group().empty()) out.commands.push_back(described(*sub));
+    if (!sub->get_group().empty()) out.commands.push_back(described(*sub, table));
   return out;
 }
 
@@ -193,16 +232,16 @@ InputError usage_error(const CLI::App& app, const CLI::ParseError& error) {
 }
 
 /// The parser would take the next word for the value of "--out=".
-void check_words(std::span<char*> words) {
-  for (const std::string_view word : words)
+void check_words(const std::vector<std::string>& words) {
+  for (const std::string& word : words)
     if (word.starts_with("--") && word.find('=') == word.size() - 1)
-      refuse_empty(std::string(word.substr(0, word.size() - 1)));
+      refuse_empty(word.substr(0, word.size() - 1));
 }
 
 /// No option means anything with an empty text, and results are files or folders.
 void check_values(const CLI::App& command) {
   for (const CLI::Option* option : command.get_options())
-    if (!option->get_positional())
+    if (option->nonpositional())
       for (const std::string& value : option->results())
         if (value.empty()) refuse_empty(option->get_name());
   const CLI::Option* out = command.get_option_no_throw("--out");
@@ -216,7 +255,7 @@ void check_values(const CLI::App& command) {
 Program::Program()
     : app_(std::make_unique<CLI::App>("Correspondence-free retargeting of human motion.",
                                       "restage")),
-      all_(*app_) {
+      all_(*app_, table_) {
   app_->set_version_flag("--version", "restage " RESTAGE_VERSION, "print the version");
   app_->require_subcommand(1);
   app_->footer(
@@ -251,17 +290,17 @@ void Program::add_common_options(CommandOptions app) {
            common_.max_memory = parse_memory(text);
            h5::set_max_memory(common_.max_memory);
          },
-         "most that an array of a file may take, unpacked (4GB; of HDF5 16GiB)")
+         "most that an array of a file may take, unpacked (default: 4GB, of HDF5 16GiB)")
       .group(group);
 }
 
 CommandOptions Program::add(CommandOptions group, const std::string& name, const std::string& help,
                             const std::string& examples, std::function<int()> action) {
   CLI::App& command = *group.app().add_subcommand(name, help);
-  add_common_options(CommandOptions(command));
+  add_common_options(CommandOptions(command, table_));
   command.footer(with_heading(examples));
   command.callback([this, run = std::move(action)] { action_ = run; });
-  return CommandOptions(command);
+  return CommandOptions(command, table_);
 }
 
 CommandOptions Program::add(const std::string& name, const std::string& help,
@@ -271,24 +310,26 @@ CommandOptions Program::add(const std::string& name, const std::string& help,
 
 CommandOptions Program::add_group(const std::string& name, const std::string& help) {
   CLI::App& group = *app_->add_subcommand(name, help);
-  add_common_options(CommandOptions(group));
+  add_common_options(CommandOptions(group, table_));
   group.require_subcommand(1);
   group.footer("More about each: restage " + name + " COMMAND --help");
-  return CommandOptions(group);
+  return CommandOptions(group, table_);
 }
 
-CommandTree Program::tree() const { return described(*app_); }
+CommandTree Program::tree() const { return described(*app_, table_); }
 
 int Program::run(int argc, char** argv) {
   common_.command_line.assign(argv, argv + argc);
   if (argc > 0) common_.command_line[0] = "restage";  // not where it lies on this machine
+  std::vector<std::string> words = common_.command_line;
+  renamed_ = rename_options(*app_, table_, words);
   try {
-    check_words(std::span(argv, static_cast<size_t>(argc)));
-    app_->parse(argc, argv);
+    check_words(words);
+    std::vector<const char*> pointers;
+    for (const std::string& word : words) pointers.push_back(word.c_str());
+    app_->parse(static_cast<int>(pointers.size()), pointers.data());
   } catch (const CLI::CallForVersion& version) {
-    const std::span<char*> words(argv, static_cast<size_t>(argc));
-    if (std::any_of(words.begin(), words.end(),
-                    [](const char* w) { return w == std::string_view("--json"); }))
+    if (std::find(words.begin(), words.end(), "--json") != words.end())
       print_json({{"version", RESTAGE_VERSION}});
     else
       print(std::string(version.what()) + "\n");
@@ -308,7 +349,10 @@ int Program::run(int argc, char** argv) {
   set_log_level(common_.quiet     ? LogLevel::quiet
                 : common_.verbose ? LogLevel::debug
                                   : LogLevel::info);
-  return action_();
+  const int code = action_();
+  // Bad input is answered with one line: remarks come when all is done.
+  for (const std::string& remark : renamed_) log_warning(remark);
+  return code;
 }
 
 namespace {
@@ -338,6 +382,7 @@ void open_standard_streams() {
 int run(int argc, char** argv) {
   open_standard_streams();
   handle_signals();
+  spell_settings([](std::string_view name) { return cat("--", name); });
   try {
     return run_program(argc, argv);
   } catch (const Error& error) {

@@ -65,6 +65,8 @@ class Program {
     return add(all_, name, help, examples, work);
   }
   const Common& common() const { return common_; }
+  /// What was said of older names in the arguments that were read: "--input of ... is called ...".
+  const std::vector<std::string>& renamed() const { return renamed_; }
   /// All commands and options, as the help pages show them.
   CommandTree tree() const;
 
@@ -75,8 +77,10 @@ class Program {
   void add_common_options(CommandOptions app);
 
   std::unique_ptr<CLI::App> app_;
+  OptionTable table_;
   CommandOptions all_;  ///< the commands themselves
   Common common_;
+  std::vector<std::string> renamed_;
   std::function<int()> action_;
 };
 

@@ -8,10 +8,11 @@
 #include "autograd/base/error.h"
 #include "autograd/base/format.h"
 #include "autograd/base/log.h"
+#include "autograd/base/words.h"
 #include "datasets/benchmark/sequence.h"
-#include "experiments/benchmark_sets.h"
-#include "experiments/clips.h"
-#include "experiments/evaluation.h"
+#include "experiments/evaluation/benchmark_sets.h"
+#include "experiments/evaluation/evaluation.h"
+#include "experiments/pictures/clips.h"
 #include "experiments/scratch.h"
 #include "experiments/sweep/sweep_dir.h"
 #include "experiments/sweep/table_formats.h"
@@ -215,10 +216,8 @@ Section differences(const std::vector<tables::Compared>& runs) {
   return {"What differs from the defaults", tables::comparison_markdown({runs[0], defaults})};
 }
 
-Section results_section(const tables::Results& results, const GatherOptions& how) {
-  tables::TableOptions options;
-  options.seed = how.seed;
-  const tables::Table table = tables::make_table(results, options);
+Section results_section(const tables::Results& results) {
+  const tables::Table table = tables::make_table(results, {});
   std::string text = tables::to_markdown(table, results);
   for (const auto* notices : {&results.notices, &table.notices})
     for (const std::string& notice : *notices) text += "\n" + notice + "\n";
@@ -231,9 +230,9 @@ std::string trials_text(const tables::Results& results) {
   std::vector<std::vector<std::string>> rows{
       {"trial", "case", "seed", "state", "s", "overrides", "host", "command"}};
   for (const tables::TrialResult& trial : results.trials) {
-    std::string overrides;
-    for (const auto& [key, value] : trial.overrides)
-      overrides += (overrides.empty() ? "" : ", ") + key + "=" + tables::plain_text(value);
+    const std::string overrides = joined(trial.overrides, [](const auto& one) {
+      return one.first + "=" + tables::plain_text(one.second);
+    });
     std::string state = tables::kTrialStates[static_cast<int>(trial.state)];
     if (!trial.error.empty()) state += ": " + trial.error;
     rows.push_back({trial.id, trial.case_name, std::to_string(trial.seed), state,
@@ -299,13 +298,13 @@ std::vector<std::string> inputs_of(const std::string& folder) {
 
 Report of_runs(const std::vector<std::string>& folders, const GatherOptions& how) {
   Report out;
+  out.title = joined(folders, last_part);
   std::string provenance, unmeasured;
   std::vector<std::optional<Measured>> measured;
   check_sequences(how.sequences);
   for (const std::string& folder : folders) {
     out.runs.push_back(tables::read_compared(folder));
     out.runs.back().name = last_part(folder);
-    out.title += (out.title.empty() ? "" : ", ") + last_part(folder);
     provenance += folder + "\n\n" + provenance_text(folder) + "\n";
     out.files.emplace_back(in(folder, "config.yaml"), read_file(in(folder, "config.yaml")));
     std::string why;
@@ -325,7 +324,7 @@ Report of_runs(const std::vector<std::string>& folders, const GatherOptions& how
     log_warning(on_one_line(unmeasured));
     out.before.push_back({"Not measured", unmeasured});
   }
-  if (!results.trials.empty()) out.before.push_back(results_section(results, how));
+  if (!results.trials.empty()) out.before.push_back(results_section(results));
   out.after = {differences(out.runs), {"Provenance", provenance}};
   return out;
 }
@@ -348,7 +347,7 @@ Report of_sweep(const std::string& dir, const GatherOptions& how) {
     const std::string id = chosen_trial(results, how.trial);
     out.plays = played_folders(weights_of(dir, id), how);
   }
-  out.before = {{"Trials", trials_text(results)}, results_section(results, how)};
+  out.before = {{"Trials", trials_text(results)}, results_section(results)};
   if (out.runs.size() > 1) out.after.push_back(differences(out.runs));
   if (std::error_code ignored; fs::exists(in(dir, "sweep.yaml"), ignored))
     out.files.emplace(out.files.begin(), in(dir, "sweep.yaml"), read_file(in(dir, "sweep.yaml")));

@@ -10,7 +10,7 @@
 namespace restage::report {
 
 struct GatherOptions {
-  uint64_t seed = 0;  ///< of held-out sequences and of the intervals' resampling
+  uint64_t seed = 0;  ///< of held-out sequences
   /// Folders with a sequence each (datasets/benchmark/sequence.h) to be played. None: of a run,
   /// those of its own held-out sequences that came out best, in the middle and worst.
   std::vector<std::string> sequences;

@@ -7,6 +7,7 @@
 #include "autograd/base/atomic_file.h"
 #include "autograd/base/log.h"
 #include "autograd/base/nearest.h"
+#include "autograd/base/words.h"
 #include "datasets/readers/sha256.h"
 #include "experiments/sweep/json_reader.h"
 #include "experiments/sweep/sweep_dir.h"
@@ -90,14 +91,8 @@ std::vector<std::string> folders(const std::string& from) {
     if (is_file(at->path().string() + "/paper.yaml")) out.push_back(at->path().filename().string());
   if (code || out.empty())
     throw InputError(from, "holds no experiments with a paper.yaml",
-                     "run this in the folder of the clone, or give --from FOLDER");
+                     "run this in the folder of the clone, or give --experiments FOLDER");
   std::sort(out.begin(), out.end());
-  return out;
-}
-
-std::string listed(const std::set<std::string>& names) {
-  std::string out;
-  for (const std::string& name : names) out += (out.empty() ? "" : ", ") + name;
   return out;
 }
 
@@ -114,20 +109,21 @@ std::vector<Evidence> find_evidence(const std::string& from, const std::string& 
     if (one.asked.paper != paper) continue;
     tables.insert(one.asked.table);
     if (!table.empty() && one.asked.table != table) continue;
-    if (one.runs() && !is_file(one.sweep_file()))
-      throw InputError(one.folder, "has rows to be run and no sweep.yaml",
-                       "write it, or say 'not_run' for each row in paper.yaml");
+    for (const char* budget : kBudgets)
+      if (const Budget& b = one.asked.budget(budget); one.runs() && !is_file(one.sweep_file(b)))
+        throw InputError(one.folder, "has rows to be run and no " + b.sweep,
+                         "write it, or say 'not_run' for each row in paper.yaml");
     found.push_back(std::move(one));
   }
   if (!found.empty()) return found;
   if (tables.empty()) {
     const std::string close = nearest(paper, {papers.begin(), papers.end()});
     throw InputError("", "there are no experiments of " + in_quotes(paper) + " in " + from,
-                     close.empty() ? "there are those of " + listed(papers)
+                     close.empty() ? "there are those of " + joined(papers)
                                    : "did you mean " + in_quotes(close) + "?");
   }
   throw InputError("", paper + " has no table " + in_quotes(table) + " here",
-                   "there are " + listed(tables));
+                   "there are " + joined(tables));
 }
 
 int take_results(const Evidence& evidence) {

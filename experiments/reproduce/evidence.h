@@ -1,6 +1,8 @@
 // The folders under experiments/ that stand for a paper's evidence, and what was found in them:
 //
 //   NAME/sweep.yaml           the experiment; absent if nothing of it runs here
+//   NAME/schedule.yaml        the same with the papers' own schedules, for the budget `paper`,
+//                             where rows differ in them
 //   NAME/paper.yaml           what the paper prints and claims (paper_file.h)
 //   NAME/README.md            what is the same here and what is not
 //   NAME/results/ID.json      result.json of trials that were run once, without weights
@@ -29,7 +31,7 @@ struct Evidence {
   PaperFile asked;
 
   bool runs() const { return !asked.none_runs(); }
-  std::string sweep_file() const { return folder + "/sweep.yaml"; }
+  std::string sweep_file(const Budget& budget) const { return folder + "/" + budget.sweep; }
 };
 
 /// Those of `paper` below `from`, by name; `table`: only that one. InputError with the known names

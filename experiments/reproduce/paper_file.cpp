@@ -45,6 +45,7 @@ void visit(V& v, Claim& c) {
   v.check("no_better_by", !c.within || !c.no_better_by, "and 'within' are two different claims",
           "give one of them");
   v("most", c.most, "three quarters of the comparisons will do");
+  v("reading", c.reading, "which reading of the sentence this is");
   v("tried", c.tried, "what was tried where it does not hold");
   v.check("than", c.better != c.than, "names one row twice", "name two rows");
 }
@@ -65,6 +66,7 @@ void visit(V& v, Picture& c) {
 
 template <class V>
 void visit(V& v, Budget& c) {
+  v("sweep", c.sweep, "its sweep file in the folder");
   v("words", c.words, "key=value of the sweep");
   v("set", c.set, "measured in the place of the paper's");
   v("note", c.note, "what a reader must know");
@@ -79,6 +81,7 @@ void visit(V& v, PaperFile& c) {
   v("beside", c.beside, "further metrics shown of ours", metric_names());
   v("tables", c.tables, "printed", required());
   v("claims", c.claims, "what the paper says of them");
+  v("contradicted", c.contradicted, "sentences that the paper's own figures contradict");
   v("pictures", c.pictures, "of rows at the same moments");
   v("smoke", c.smoke, "minutes");
   v("lite", c.lite, "hours");

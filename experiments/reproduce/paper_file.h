@@ -1,5 +1,5 @@
 // paper.yaml: what a paper prints about one experiment, and what it claims from it, beside the
-// sweep.yaml that runs the experiment here (docs/notes/design/reproduction.md).
+// sweep.yaml that runs the experiment here (docs/reproduction.md).
 #pragma once
 
 #include <optional>
@@ -31,6 +31,7 @@ struct Claim {
   std::optional<double> within;        ///< the two differ by less than this, either way
   std::optional<double> no_better_by;  ///< `better` gains less than this; it may be worse
   bool most = false;                   ///< "almost all": three quarters of the comparisons will do
+  std::string reading;                 ///< which of several readings of the sentence this is
   std::string tried;                   ///< what was tried where it does not hold
 };
 
@@ -47,9 +48,10 @@ struct Picture {
 
 /// What a budget adds to the sweep.
 struct Budget {
-  std::vector<std::string> words;  ///< as `restage sweep run` takes them
-  std::string set;                 ///< measured in the place of the paper's sets; empty: those
-  std::string note;                ///< what a reader of its figures must know
+  std::string sweep = "sweep.yaml";  ///< its file in the folder, where rows are not those of others
+  std::vector<std::string> words;    ///< as `restage sweep run` takes them
+  std::string set;                   ///< measured in the place of the paper's sets; empty: those
+  std::string note;                  ///< what a reader of its figures must know
 };
 
 inline constexpr const char* kBudgets[] = {"smoke", "lite", "paper"};
@@ -62,6 +64,7 @@ struct PaperFile {
   std::vector<std::string> beside;   ///< further ones that are shown of ours
   std::vector<PaperTable> tables;
   std::vector<Claim> claims;
+  std::vector<std::string> contradicted;  ///< sentences that the paper's own figures contradict
   std::vector<Picture> pictures;
   Budget smoke, lite, full;
 

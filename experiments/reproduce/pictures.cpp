@@ -7,9 +7,9 @@
 
 #include "autograd/base/format.h"
 #include "autograd/base/log.h"
-#include "experiments/clips.h"
+#include "experiments/evaluation/world_map.h"
+#include "experiments/pictures/clips.h"
 #include "experiments/sweep/sweep_dir.h"
-#include "experiments/world_map.h"
 #include "infer/render/figures.h"
 #include "infer/render/sheet.h"
 

@@ -8,6 +8,7 @@
 
 #include "autograd/base/atomic_file.h"
 #include "autograd/base/error.h"
+#include "autograd/base/words.h"
 #include "experiments/sweep/results.h"
 #include "experiments/sweep/svg.h"
 #include "experiments/sweep/table_formats.h"
@@ -31,11 +32,10 @@ void flatten(const ConfigNode& node, const std::string& key,
   } else if (node.kind == ConfigNode::Kind::null) {
     (*out)[key] = "null";
   } else if (node.kind == ConfigNode::Kind::list && !walked) {
-    std::string text;
-    for (const ConfigNode& item : node.children)
-      text += (text.empty() ? "" : ", ") +
-              (item.kind == ConfigNode::Kind::null ? std::string("null") : item.text);
-    (*out)[key] = "[" + text + "]";
+    const auto text = [](const ConfigNode& item) {
+      return item.kind == ConfigNode::Kind::null ? std::string("null") : item.text;
+    };
+    (*out)[key] = "[" + joined(node.children, text) + "]";
   } else {
     for (size_t i = 0; i < node.children.size(); ++i) {
       const ConfigNode& child = node.children[i];

@@ -7,6 +7,7 @@
 #include <set>
 
 #include "autograd/base/nearest.h"
+#include "autograd/base/words.h"
 #include "nn/config/config.h"
 #include "train/training/train_config.h"
 
@@ -127,8 +128,7 @@ std::string shown(const Setting& setting) {
           shown(a.settings[i]) + " and " + shown(b.settings[i]) + " give the same trial",
           "leave one out; names, folders and logging change no result");
   if (a.one == b.one && !b.settings.empty()) {
-    std::string keys;
-    for (const Setting& setting : b.settings) keys += (keys.empty() ? "" : ", ") + setting.key;
+    const std::string keys = joined(b.settings, &Setting::key);
     throw InputError(b.settings.back().value.place.text(), "a value of " + keys + " is given twice",
                      "leave one out");
   }
@@ -138,14 +138,19 @@ std::string shown(const Setting& setting) {
                    "leave one out; names, folders and logging change no result");
 }
 
+/// The configuration of a combination: its base, what holds for all, its own settings.
+ConfigNode tree_of(const SweepFile& file, const Combination& combination) {
+  const std::string& own = combination.one->base;
+  ConfigNode tree = load_config_tree(own.empty() ? file.base : own);
+  for (const Settings* settings : {&file.set, &combination.settings})
+    for (const Setting& setting : *settings) lay(tree, setting);
+  return tree;
+}
+
 class Planner {
  public:
-  explicit Planner(const SweepFile& file)
-      : file_(file), planner_(file.evaluate, file.store), base_(load_config_tree(file.base)) {
-    for (const Setting& setting : file.set) {
-      lay(base_, setting);
-      unread_.insert(setting.key);
-    }
+  explicit Planner(const SweepFile& file) : file_(file), planner_(file.evaluate, file.store) {
+    for (const Setting& setting : file.set) unread_.insert(setting.key);
   }
 
   SweepPlan plan() {
@@ -168,11 +173,10 @@ class Planner {
   }
 
   void add(const Combination& combination) {
-    ConfigNode tree = base_;
+    ConfigNode tree = tree_of(file_, combination);
     std::map<std::string, std::string> overrides;
     std::vector<std::string> keys;
     for (const Setting& setting : combination.settings) {
-      lay(tree, setting);
       overrides[setting.key] = value_text(setting.value);
       keys.push_back(setting.key);
     }
@@ -229,7 +233,6 @@ class Planner {
 
   const SweepFile& file_;
   TrialPlanner planner_;
-  ConfigNode base_;
   std::set<std::string> unread_;  ///< keys of `set` that no trial has read so far
   std::map<std::string, Combination> ids_;
   size_t trials_ = 0;  ///< how many there will be
@@ -243,11 +246,9 @@ void check(const EarlyStop& rule, const SweepPlan& plan) {
     for (const std::string& figure : type.figures) known.push_back(type.name + "." + figure);
   if (std::find(known.begin(), known.end(), rule.metric) == known.end()) {
     const std::string close = nearest(rule.metric, known);
-    std::string all;
-    for (const std::string& name : known) all += (all.empty() ? "" : ", ") + name;
     throw InputError(
         rule.place.text(), "no stage measures " + in_quotes(rule.metric),
-        close.empty() ? "use one of " + all : "did you mean " + in_quotes(close) + "?");
+        close.empty() ? "use one of " + joined(known) : "did you mean " + in_quotes(close) + "?");
   }
   for (const PlannedTrial& trial : plan.trials)
     for (const StageArtifact& artifact : trial.artifacts)
@@ -282,6 +283,13 @@ Json node_json(const ConfigNode& node) {
 }
 
 }  // namespace
+
+std::vector<std::pair<std::string, ConfigNode>> configurations(const SweepFile& file) {
+  std::vector<std::pair<std::string, ConfigNode>> out;
+  for (const Combination& one : without_excluded(file, combinations(file)))
+    out.emplace_back(one.one->name, tree_of(file, one));
+  return out;
+}
 
 SweepPlan plan_sweep(const SweepFile& file) {
   SweepPlan plan = Planner(file).plan();
@@ -325,10 +333,7 @@ TrialEntry entry_of(const PlannedTrial& trial) {
 }
 
 std::string describe(const PlannedTrial& trial) {
-  std::string out;
-  for (const auto& [key, value] : trial.overrides)
-    out += (out.empty() ? "" : ", ") + key + "=" + value;
-  return out;
+  return joined(trial.overrides, [](const auto& one) { return one.first + "=" + one.second; });
 }
 
 }  // namespace restage::sweep

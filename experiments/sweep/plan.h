@@ -1,6 +1,8 @@
 // From a sweep file to its trials.
 #pragma once
 
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "experiments/sweep/plan_file.h"
@@ -25,6 +27,10 @@ struct SweepPlan {
 /// at file and line: a value that the configuration refuses, a key that no stage reads, an
 /// `exclude` that matches nothing, two combinations that give the same trial.
 SweepPlan plan_sweep(const SweepFile& file);
+
+/// The configurations alone, each with the name of its case; seeds apart, and nothing of them is
+/// checked.
+std::vector<std::pair<std::string, ConfigNode>> configurations(const SweepFile& file);
 
 /// Trains a few steps of every stage that is to be made; trials that differ by their seed alone are
 /// measured once.

@@ -1,5 +1,5 @@
-// DIR/plan.json: what a sweep's folder stands for (docs/notes/design/experiments.md). It may come
-// from any machine, so nothing in it is believed.
+// DIR/plan.json: what a sweep's folder stands for (docs/experiments.md). It may come from any
+// machine, so nothing in it is believed.
 #pragma once
 
 #include <cstdint>

@@ -46,6 +46,28 @@ class ResultReader : public sweep::JsonReader<SortedJson> {
     }
     return out;
   }
+  StageCurves stage(const SortedJson& entry) const {
+    need(entry.is_object(), "training", "a section for each stage");
+    StageCurves out;
+    for (const auto& [name, number] :
+         {std::pair{"steps", &out.steps}, std::pair{"batch", &out.batch}})
+      if (const SortedJson& value = at(entry, name); !value.is_null()) {
+        need(value.is_number_unsigned(), name, "a whole number");
+        *number = value.get<int64_t>();
+      }
+    for (const SortedJson& curve : list(entry, "curves")) {
+      Curve points;
+      for (const SortedJson& point : list(curve, "points")) {
+        need(point.is_array() && point.size() == 2 && point[0].is_number() && point[1].is_number(),
+             "points", "pairs of a step and a value");
+        need(points.empty() || points.back().first < point[0].get<double>(), "points",
+             "pairs whose steps rise");
+        points.emplace_back(point[0].get<double>(), point[1].get<double>());
+      }
+      out.curves.emplace_back(text(curve, "figure"), std::move(points));
+    }
+    return out;
+  }
   SetResult set(const SortedJson& entries) const {
     SetResult out{scores(entries)};
     for (const SortedJson& sequence : list(entries, "sequences"))
@@ -168,6 +190,9 @@ TrialResult parse_result(const SortedJson& document, const std::string& path,
   out.command = reader.optional_text(document, "command");
   out.early_stop = reader.at(document, "early_stop");
   if (out.state != TrialState::done) return out;
+  if (!reader.at(document, "training").is_null())
+    for (const auto& [name, stage] : reader.section(document, "training").items())
+      out.training.emplace(name, reader.stage(stage));
   for (const auto& [name, set] : reader.section(document, "metrics").items())
     out.sets.emplace_back(name, reader.set(set));
   return out;

@@ -6,6 +6,7 @@
 
 #include <map>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -29,6 +30,16 @@ struct SetResult : Scores {
   std::vector<std::pair<std::string, Scores>> references = {};
 };
 
+/// A validation's figure by step, in the order of steps.
+using Curve = std::vector<std::pair<double, double>>;
+
+/// How a trial trained one of its stages, or found it trained.
+struct StageCurves {
+  std::optional<int64_t> steps = {}, batch = {};
+  std::vector<std::pair<std::string, Curve>> curves =
+      {};  ///< by figure; the stage's first one first
+};
+
 /// Damaged: what is there cannot be used.
 enum class TrialState { done, failed, stopped, pending, damaged };
 inline constexpr const char* kTrialStates[] = {"done", "failed", "stopped", "pending", "damaged"};
@@ -41,6 +52,7 @@ struct TrialResult : sweep::TrialEntry {
   std::string host = {}, command = {};                       ///< where and how it was made
   nlohmann::json early_stop = nullptr;                       ///< the rule that stopped it
   std::vector<std::pair<std::string, SetResult>> sets = {};  ///< of one that is done
+  std::map<std::string, StageCurves> training = {};          ///< by stage; older results have none
 };
 
 struct Results {

@@ -110,15 +110,13 @@ void plan_in_a_process(const std::string& dir, const std::vector<std::string>& a
   errors.close_writer();
   const std::string last = pass_on(errors.read);
   int status = 0;
-  while (::waitpid(pid, &status, 0) < 0 && errno == EINTR) {
-  }
+  while (::waitpid(pid, &status, 0) < 0)
+    if (errno != EINTR) throw WorkError("how planning ended was not told; let SIGCHLD be");
   if (!WIFEXITED(status))
     throw WorkError("planning was killed by signal " + std::to_string(WTERMSIG(status)));
   const int code = WEXITSTATUS(status);
   if (code == 0) return;
-  const size_t fix = last.rfind("; ");
-  if (code == 2 && fix != std::string::npos)
-    throw InputError("", last.substr(0, fix), last.substr(fix + 2));
+  if (code == 2 && !last.empty()) throw InputError::of_line(last);
   throw Error(last.empty() ? "planning ended with exit code " + std::to_string(code) : last, code);
 }
 

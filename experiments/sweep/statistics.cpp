@@ -5,8 +5,6 @@
 #include <iterator>
 #include <set>
 
-#include "autograd/base/rng.h"
-
 namespace restage::tables {
 namespace {
 
@@ -27,47 +25,58 @@ double average(const std::map<std::string, double>& sequences) {
   return count > 0 ? sum / count : std::nan("");
 }
 
-/// Values beside a mask of what is there, [trials, sequences]. Rows are shifted so that their
-/// averages are the means as told; a trial without sequences has its mean in every column.
-struct Matrix {
-  Eigen::MatrixXd values, mask;
-};
-
-Matrix matrix_of(const Sample& sample) {
-  std::set<std::string> names;
-  for (const Repetition& r : sample)
-    for (const auto& [name, value] : r.sequences)
-      if (present(value)) names.insert(name);
-  const auto columns = static_cast<Eigen::Index>(std::max<size_t>(1, names.size()));
-  const auto rows = static_cast<Eigen::Index>(sample.size());
-  Matrix m{Eigen::MatrixXd::Zero(rows, columns), Eigen::MatrixXd::Zero(rows, columns)};
-  for (Eigen::Index k = 0; k < rows; ++k) {
-    const Repetition& r = sample[static_cast<size_t>(k)];
-    const double own = average(r.sequences);
-    if (!present(own)) {
-      m.values.row(k).setConstant(r.mean);
-      m.mask.row(k).setOnes();
-      continue;
-    }
-    Eigen::Index s = 0;
-    for (const std::string& name : names) {
-      const auto found = r.sequences.find(name);
-      if (found != r.sequences.end() && present(found->second)) {
-        m.values(k, s) = found->second + (r.mean - own);
-        m.mask(k, s) = 1;
-      }
-      ++s;
-    }
-  }
-  return m;
+double average(const std::map<std::string, double>& sequences,
+               const std::vector<std::string>& names) {
+  double sum = 0;
+  for (const std::string& name : names) sum += sequences.at(name);
+  return sum / static_cast<double>(names.size());
 }
 
-void draw_counts(const RngKey& key, Eigen::MatrixXf* counts) {
-  counts->setZero();
-  Rng rng(key);
-  const auto n = static_cast<uint64_t>(counts->cols());
-  for (Eigen::Index r = 0; r < counts->rows(); ++r)
-    for (uint64_t i = 0; i < n; ++i) (*counts)(r, static_cast<Eigen::Index>(rng.below(n))) += 1;
+double square(double x) { return x * x; }
+
+double variance(const std::vector<double>& x) {
+  double sum = 0, squares = 0;
+  for (const double v : x) sum += v;
+  const auto n = static_cast<double>(x.size());
+  for (const double v : x) squares += square(v - sum / n);
+  return squares / (n - 1);
+}
+
+/// Names of the sequences on which every trial has a value.
+std::vector<std::string> shared_sequences(const Sample& sample) {
+  std::vector<std::string> out;
+  for (const auto& one : sample[0].sequences)
+    if (std::all_of(sample.begin(), sample.end(), [&](const Repetition& r) {
+          const auto found = r.sequences.find(one.first);
+          return found != r.sequences.end() && present(found->second);
+        }))
+      out.push_back(one.first);
+  return out;
+}
+
+/// Mean squares of a two-way table: of trials and sequences, and of what is left.
+std::vector<Part> parts_of(const Sample& sample) {
+  const std::vector<std::string> names = shared_sequences(sample);
+  const int n = static_cast<int>(sample.size()), s = static_cast<int>(names.size());
+  std::vector<double> rows, columns(names.size());
+  for (const Repetition& r : sample) rows.push_back(r.mean);
+  for (size_t k = 0; k < names.size(); ++k)
+    for (const Repetition& r : sample) columns[k] += r.sequences.at(names[k]) / n;
+  if (n == 1 && s < 2) return {};
+  if (n == 1) return {{variance(columns) / s, s - 1}};
+  if (s < 2) return {{variance(rows) / n, n - 1}};
+  double all = 0, left = 0;
+  for (const double c : columns) all += c / s;
+  for (const Repetition& r : sample) {
+    const double own = average(r.sequences, names);
+    for (size_t k = 0; k < names.size(); ++k)
+      left += square(r.sequences.at(names[k]) - own - columns[k] + all);
+  }
+  const double cells = static_cast<double>(n) * s;
+  left /= (n - 1) * (s - 1);
+  return {{std::max(0.0, s * variance(rows) - left) / cells, n - 1},
+          {std::max(0.0, n * variance(columns) - left) / cells, s - 1},
+          {left / cells, (n - 1) * (s - 1)}};
 }
 
 }  // namespace
@@ -107,61 +116,60 @@ double largest_contradiction(const Sample& sample) {
   return largest;
 }
 
-double quantile(std::span<const double> sorted, double q) {
-  const double at = q * static_cast<double>(sorted.size() - 1);
-  const auto below = static_cast<size_t>(at);
-  if (below + 1 >= sorted.size()) return sorted.back();
-  const double low = sorted[below], high = sorted[below + 1];
-  return low + (at - static_cast<double>(below)) * (high - low);
+// Abramowitz and Stegun, 26.7.3 and 26.7.4.
+double student(double t, int freedom) {
+  const double angle = std::atan(t / std::sqrt(freedom)), s = std::sin(angle), c = std::cos(angle);
+  const bool odd = freedom % 2 == 1;
+  double term = odd ? c : 1, sum = freedom == 1 ? 0 : term;
+  for (int k = odd ? 3 : 2; k < freedom; k += 2) sum += term *= c * c * (k - 1) / k;
+  return odd ? (angle + s * sum) * 2 / M_PI : s * sum;
 }
 
-const Bootstrap::Draws& Bootstrap::draws(Eigen::Index trials, Eigen::Index sequences) {
-  const auto [at, is_new] = draws_.try_emplace({trials, sequences});
-  Draws& d = at->second;
-  if (is_new) {
-    d.trials.resize(resamples_, trials);
-    d.sequences.resize(resamples_, sequences);
-    const RngKey key = RngKey{seed_}.fold("bootstrap");
-    draw_counts(key.fold("trials"), &d.trials);
-    draw_counts(key.fold("sequences"), &d.sequences);
+double student_quantile(double share, int freedom) {
+  double low = 0, high = 1;
+  while (student(high, freedom) < share && high < 1e15) high *= 2;
+  for (int i = 0; i < 100 && high - low > 1e-14 * high; ++i) {
+    const double middle = 0.5 * (low + high);
+    (student(middle, freedom) < share ? low : high) = middle;
   }
-  return d;
+  return high;
 }
 
-Estimate Bootstrap::estimate(const Sample& all) {
+double Estimate::half_width(double alpha) const {
+  double sum = 0;
+  for (const Part& part : parts)
+    if (part.variance > 0) sum += square(student_quantile(1 - alpha, part.freedom)) * part.variance;
+  return std::sqrt(sum);
+}
+
+double Estimate::p_beyond(double border) const {
+  if (parts.empty() || !mean) return 1;
+  const double away = std::abs(*mean - border);
+  double inside = 0, beyond = 1;
+  for (int i = 0; i < 50; ++i) {
+    const double middle = 0.5 * (inside + beyond);
+    (half_width(middle) > away ? inside : beyond) = middle;
+  }
+  return beyond;
+}
+
+Estimate estimate(const Sample& all) {
+  constexpr double kAlpha = 0.05;
   const Sample sample = measured(all);
   Estimate out;
   out.n = static_cast<int>(sample.size());
   if (sample.empty()) return out;
-  const auto n = static_cast<double>(sample.size());
-  double sum = 0, squares = 0;
-  for (const Repetition& r : sample) sum += r.mean;
-  out.mean = sum / n;
-  for (const Repetition& r : sample) squares += (r.mean - *out.mean) * (r.mean - *out.mean);
-  if (out.n > 1) out.deviation = std::sqrt(squares / (n - 1));
-
-  const Matrix m = matrix_of(sample);
-  if (m.values.size() == 1) return out;
-  const Draws& d = draws(m.values.rows(), m.values.cols());
-  // Of every resample and trial: the sum over the drawn sequences, and how many there were.
-  const Eigen::MatrixXd drawn = d.sequences.cast<double>();
-  const Eigen::MatrixXd sums = drawn * m.values.transpose(), counts = drawn * m.mask.transpose();
   std::vector<double> means;
-  means.reserve(static_cast<size_t>(resamples_));
-  for (Eigen::Index r = 0; r < sums.rows(); ++r) {
-    double total = 0, weight = 0;
-    for (Eigen::Index k = 0; k < sums.cols(); ++k) {
-      if (counts(r, k) == 0) continue;
-      const auto times = static_cast<double>(d.trials(r, k));
-      total += times * sums(r, k) / counts(r, k);
-      weight += times;
-    }
-    if (weight > 0) means.push_back(total / weight);
-  }
-  if (means.empty()) return out;
-  std::sort(means.begin(), means.end());
-  out.low = quantile(means, 0.025);
-  out.high = quantile(means, 0.975);
+  for (const Repetition& r : sample) means.push_back(r.mean);
+  double sum = 0;
+  for (const double mean : means) sum += mean;
+  out.mean = sum / out.n;
+  if (out.n > 1) out.deviation = std::sqrt(variance(means));
+  out.parts = parts_of(sample);
+  if (out.parts.empty()) return out;
+  const double half = out.half_width(kAlpha);
+  out.low = *out.mean - half;
+  out.high = *out.mean + half;
   return out;
 }
 

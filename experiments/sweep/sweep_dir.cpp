@@ -70,8 +70,12 @@ std::string resolved(const SweepFile& file, const std::string& dir) {
   }
   if (!grid.children.empty()) put(root, "grid", std::move(grid));
   if (!zip.children.empty()) put(root, "zip", std::move(zip));
-  for (const Case& one : file.cases)
-    if (!one.name.empty()) put(cases, one.name, settings_node(one.settings));
+  for (const Case& one : file.cases) {
+    if (one.name.empty()) continue;
+    ConfigNode node = settings_node(one.settings);
+    if (!one.base.empty()) put(node, "base", text_node(fs::relative(one.base, dir).string()));
+    put(cases, one.name, std::move(node));
+  }
   if (!cases.children.empty()) put(root, "cases", std::move(cases));
   for (const Exclusion& exclusion : file.exclude) append(exclude, settings_node(exclusion.values));
   if (!exclude.children.empty()) put(root, "exclude", std::move(exclude));
@@ -208,6 +212,7 @@ void write_result(const SweepDir& dir, const TrialEntry& trial, TrialState state
   Json document = entry_json(made);
   document.update({{"state", tables::kTrialStates[static_cast<int>(state)]},
                    {"error", error.empty() ? Json(nullptr) : Json(error)},
+                   {"training", outcome.training},
                    {"metrics", outcome.metrics},
                    {"seconds", std::round(1e3 * seconds) / 1e3},
                    {"host", host_name()},

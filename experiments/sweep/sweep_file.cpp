@@ -8,6 +8,7 @@
 
 #include "autograd/base/atomic_file.h"
 #include "autograd/base/nearest.h"
+#include "autograd/base/words.h"
 #include "experiments/shipped_config.h"
 #include "experiments/sweep/sweep_words.h"
 #include "nn/config/config_reader.h"
@@ -36,10 +37,9 @@ void check_keys(const ConfigNode& map, const std::vector<std::string>& known) {
   for (const ConfigNode& entry : map.children) {
     if (std::find(known.begin(), known.end(), entry.key) != known.end()) continue;
     const std::string close = nearest(entry.key, known);
-    std::string all;
-    for (const std::string& key : known) all += (all.empty() ? "" : ", ") + key;
     fail(entry.key_place, "unknown key " + in_quotes(entry.key),
-         close.empty() ? "the keys here are " + all : "did you mean " + in_quotes(close) + "?");
+         close.empty() ? "the keys here are " + joined(known)
+                       : "did you mean " + in_quotes(close) + "?");
   }
 }
 
@@ -216,16 +216,22 @@ class SweepReader {
     const ConfigNode* base = tree_.find("base");
     if (base == nullptr)
       fail(tree_.place, "the key 'base' is missing", "name the configuration to vary");
-    need(*base, Kind::scalar, "the file of a training configuration");
     out_.base_place = base->place;
-    out_.base = (fs::path(out_.path).parent_path() / base->text).lexically_normal().string();
+    out_.base = base_of(*base);
+  }
+
+  /// The file of a configuration, seen from the working directory.
+  std::string base_of(const ConfigNode& base) const {
+    need(base, Kind::scalar, "the file of a training configuration");
+    std::string out = (fs::path(out_.path).parent_path() / base.text).lexically_normal().string();
     std::error_code ignored;
-    if (fs::is_regular_file(out_.base, ignored)) return;
-    out_.base = shipped_config(base->text);
-    if (out_.base.empty())
-      fail(base->place, "the base " + in_quotes(base->text) + " is no file",
+    if (fs::is_regular_file(out, ignored)) return out;
+    out = shipped_config(base.text);
+    if (out.empty())
+      fail(base.place, "the base " + in_quotes(base.text) + " is no file",
            "give a path relative to the sweep file, or the name of a configuration that comes with "
            "the program");
+    return out;
   }
 
   void read_axes() {
@@ -268,6 +274,8 @@ class SweepReader {
       Case made{entry.key, entry.key_place, {}};
       if (entry.kind != Kind::null)
         made.settings = settings_of(entry, "a section {key: value}", true);
+      if (const ConfigNode* base = entry.find("base")) made.base = base_of(*base);
+      std::erase_if(made.settings, [](const Setting& setting) { return setting.key == "base"; });
       for (const Setting& setting : made.settings)
         for (const Axis& axis : out_.axes)
           for (const Setting& first : axis.points[0])
@@ -339,6 +347,9 @@ void add_argument(SweepFile& file, const SweepWord& word) {
   if (word.key == "base") {
     if (word.values.size() != 1 || word.values[0].text.empty())
       fail(place, "is no file", "write base=CONFIG.yaml");
+    if (std::none_of(file.cases.begin(), file.cases.end(),
+                     [](const Case& one) { return one.base.empty(); }))
+      fail(place, "is said by every case of " + file.path, "change it there");
     file.base = config_file(word.values[0].text);
     file.base_place = place;
     return;

@@ -29,7 +29,8 @@ struct Axis {
 struct Case {
   std::string name;  ///< "" if the file has no cases
   ConfigPlace place;
-  Settings settings;  ///< with a `seed` of its own it is not multiplied by the sweep's
+  Settings settings;      ///< with a `seed` of its own it is not multiplied by the sweep's
+  std::string base = {};  ///< a configuration in the place of the sweep's; "": the sweep's
 };
 
 /// Combinations that have all of these values are left out.

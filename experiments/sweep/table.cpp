@@ -6,6 +6,7 @@
 
 #include "autograd/base/error.h"
 #include "autograd/base/nearest.h"
+#include "autograd/base/words.h"
 
 namespace restage::tables {
 namespace {
@@ -19,10 +20,9 @@ struct Group {
   std::string reference;  ///< its values of this reference; empty: the trials' own
 };
 
-std::string joined(const std::vector<std::string>& words) {
-  std::string text;
-  for (const std::string& word : words) text += (text.empty() ? "'" : ", '") + word + "'";
-  return text;
+template <class Words>
+std::string quoted_list(const Words& words) {
+  return joined(words, [](const std::string& word) { return "'" + word + "'"; });
 }
 
 // ---- groups ------------------------------------------------------------------------------------
@@ -46,7 +46,7 @@ void check_keys(const Results& results, const std::vector<std::string>& rows) {
     throw InputError("", "no trial has the key '" + row + "' to make rows of",
                      !near.empty()   ? "did you mean '" + near + "'?"
                      : names.empty() ? "these trials have neither cases nor overrides"
-                                     : "there are " + joined(names));
+                                     : "there are " + quoted_list(names));
   }
 }
 
@@ -116,11 +116,12 @@ std::vector<std::string> labels(const std::vector<Group>& groups) {
   std::vector<std::string> out;
   std::set<std::string> taken;
   for (const Group& g : groups) {
-    std::string label = g.key.contains("case") ? plain_text(g.key.at("case")) : "";
+    std::vector<std::string> parts;
+    if (g.key.contains("case")) parts.push_back(plain_text(g.key.at("case")));
     for (const auto& [key, value] : g.key)
       if (key != "case" && !is_common(groups, key) && !follows_from_case(groups, key))
-        label += (label.empty() ? "" : ", ") + key + "=" + plain_text(value);
-    if (label.empty()) label = "base";
+        parts.push_back(key + "=" + plain_text(value));
+    const std::string label = parts.empty() ? "base" : joined(parts);
     std::string unique = label;
     for (int i = 2; !taken.insert(unique).second; ++i) unique = label + " #" + std::to_string(i);
     out.push_back(unique);
@@ -140,7 +141,7 @@ size_t find_row(const std::vector<Row>& rows, const std::string& wanted) {
   throw InputError("",
                    "'" + wanted + "' is the beginning of " +
                        (found.empty() ? "no row" : std::to_string(found.size()) + " rows"),
-                   names.empty() ? "there are no rows" : "the rows are " + joined(names));
+                   names.empty() ? "there are no rows" : "the rows are " + quoted_list(names));
 }
 
 // ---- cells -------------------------------------------------------------------------------------
@@ -157,7 +158,7 @@ std::vector<const metrics::Metric*> columns(const std::vector<std::string>& name
       const std::string near = nearest(name, known);
       throw InputError(
           "", "there is no metric '" + name + "'",
-          near.empty() ? "there are " + joined(known) : "did you mean '" + near + "'?");
+          near.empty() ? "there are " + quoted_list(known) : "did you mean '" + near + "'?");
     }
     out.push_back(&metrics::recorded()[static_cast<size_t>(at - known.begin())]);
   }
@@ -210,14 +211,14 @@ Sample without_repeats(const Sample& sample) {
 
 /// Differences are taken in pairs of one and the same trial where one side is a reference.
 Estimate difference(const Group& row, const Group& against, const std::string& set,
-                    const std::string& metric, Bootstrap* bootstrap) {
+                    const std::string& metric) {
   const Group& trials = row.reference.empty() ? row : against;
   const bool beside = row.reference.empty() != against.reference.empty();
   Sample pairs =
       paired_difference(sample_of(beside ? trials : row, row.reference, set, metric),
                         sample_of(beside ? trials : against, against.reference, set, metric));
   const bool references = !row.reference.empty() && !against.reference.empty();
-  return bootstrap->estimate(references ? without_repeats(pairs) : pairs);
+  return estimate(references ? without_repeats(pairs) : pairs);
 }
 
 Row head_of(const Group& group, const std::string& label) {
@@ -250,7 +251,7 @@ void tell_pooled(const std::vector<Group>& groups, std::vector<std::string>* not
       for (const auto& [key, value] : keys_of(*trial))
         if (!g.key.contains(key) && keys_of(*g.trials.front())[key] != value) pooled.insert(key);
   if (!pooled.empty())
-    notices->push_back("rows pool trials that differ in " + joined({pooled.begin(), pooled.end()}) +
+    notices->push_back("rows pool trials that differ in " + quoted_list(pooled) +
                        ", and each of them counts as a repetition; name these keys in --rows to "
                        "tell them apart");
 }
@@ -263,11 +264,11 @@ void tell_averaged(const Results& results, Table* table) {
         averaged.push_back(row.label + " on " + set);
   if (!averaged.empty())
     table->notices.push_back("not the same beside all rows, so that their lines are averages: " +
-                             joined(averaged) + "; --against takes each row's own");
+                             quoted_list(averaged) + "; --against takes each row's own");
 }
 
 /// Metric by metric of one set, for all rows.
-void fill_set(const std::vector<Group>& groups, size_t set, Bootstrap* bootstrap, Table* table) {
+void fill_set(const std::vector<Group>& groups, size_t set, Table* table) {
   double contradiction = 0;
   const std::string& name = table->sets[set];
   for (size_t c = 0; c < table->columns.size(); ++c)
@@ -278,14 +279,25 @@ void fill_set(const std::vector<Group>& groups, size_t set, Bootstrap* bootstrap
       Sample sample = sample_of(group, group.reference, name, metric);
       contradiction = std::max(contradiction, largest_contradiction(sample));
       if (!group.reference.empty()) sample = without_repeats(sample);
-      cell.value = bootstrap->estimate(sample);
+      cell.value = estimate(sample);
       if (table->against && r != *table->against)
-        cell.difference = difference(group, groups[*table->against], name, metric, bootstrap);
+        cell.difference = difference(group, groups[*table->against], name, metric);
     }
   if (contradiction > 1e-6)
     table->notices.push_back("set '" + table->sets[set] +
                              "': some means are not the averages of their sequences; means are "
                              "given as told, intervals are those of sequences shifted to them");
+}
+
+/// What a reader of differences must know.
+void tell_few(Table* table) {
+  constexpr int kEnoughSeeds = 5;
+  std::vector<std::string> few;
+  for (const Row& row : table->rows)
+    if (!row.reference && row.n > 0 && row.n < kEnoughSeeds) few.push_back(row.label);
+  if (table->against && !few.empty())
+    table->notices.push_back("fewer than five trials stand behind " + quoted_list(few) +
+                             ": small differences cannot be told; add seeds=1,2,3,4,5");
 }
 
 }  // namespace
@@ -337,9 +349,9 @@ Table make_table(const Results& results, const TableOptions& options) {
   if (!options.against.empty()) table.against = find_row(table.rows, options.against);
   tell_pooled({groups.begin(), groups.end() - static_cast<std::ptrdiff_t>(table.references)},
               &table.notices);
-  Bootstrap bootstrap(options.seed);
-  for (size_t s = 0; s < table.sets.size(); ++s) fill_set(groups, s, &bootstrap, &table);
+  for (size_t s = 0; s < table.sets.size(); ++s) fill_set(groups, s, &table);
   tell_averaged(results, &table);
+  tell_few(&table);
   return table;
 }
 

@@ -17,7 +17,6 @@ struct TableOptions {
   std::vector<std::string> rows = {};  ///< keys to group by, also "case"; none: case and overrides
   std::vector<std::string> columns = {};  ///< METRIC; none: all
   std::string against = {};  ///< a row's label or the unambiguous beginning of one; or none
-  uint64_t seed = 0;         ///< of the resampling
 };
 
 struct Cell {

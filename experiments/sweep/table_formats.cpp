@@ -6,6 +6,7 @@
 #include <set>
 
 #include "autograd/base/error.h"
+#include "autograd/base/words.h"
 #include "experiments/sweep/svg.h"
 #include "experiments/text.h"
 
@@ -97,8 +98,8 @@ void each_table(const Table& table,
 }
 
 std::string note() {
-  return "mean ± sample deviation over n trials [95 % interval: bootstrap over sequences and "
-         "seeds]";
+  return "mean ± sample deviation over n trials [95 % interval, over seeds and "
+         "sequences]";
 }
 
 // ---- CSV ---------------------------------------------------------------------------------------
@@ -278,13 +279,12 @@ std::string for_markdown(const std::string& text) {
 }
 
 std::string counts_text(const Results& results) {
-  std::string text;
+  std::vector<std::string> texts;
   for (const TrialState state : {TrialState::done, TrialState::failed, TrialState::stopped,
                                  TrialState::pending, TrialState::damaged})
     if (const int count = results.count(state); count > 0 || state == TrialState::done)
-      text += (text.empty() ? "" : ", ") + std::to_string(count) + " " +
-              kTrialStates[static_cast<int>(state)];
-  return text;
+      texts.push_back(cat(count, " ", kTrialStates[static_cast<int>(state)]));
+  return joined(texts);
 }
 
 std::string to_markdown(const Table& table, const Results& results) {
@@ -355,8 +355,7 @@ std::string to_svg(const Table& table) {
     }
     y += kStep * static_cast<double>(table.rows.size()) + kTop + 40;
   }
-  svg.text(12, y - 18, "mean, and 95 % interval by bootstrap over sequences and seeds", "start", 10,
-           "#555");
+  svg.text(12, y - 18, "mean, and 95 % interval over seeds and sequences", "start", 10, "#555");
   return svg.document(width + 20, y - 8);
 }
 
@@ -374,7 +373,6 @@ Json to_json(const Table& table, const Results& results) {
           {"references", std::move(references)},
           {"against", table.against ? Json(table.rows[*table.against].label) : Json(nullptr)},
           {"trials", std::move(counts)},
-          {"resamples", kResamples},
           {"notices", notices}};
 }
 

@@ -111,8 +111,11 @@ TrialEnd perform_trial(const std::string& path, const std::string& id, bool quie
     lease->forget();
     return TrialEnd::before;
   }
+  // Of attempts that failed or were stopped; a killed one left nothing.
+  const auto earlier = read_result(dir, id);
+  const double before = earlier ? earlier->seconds : 0;
   std::error_code ignored;
-  fs::remove(dir.result(id), ignored);  // of an attempt that failed or was stopped
+  fs::remove(dir.result(id), ignored);
   remove_drafts(dir, id);
   if (!is_standard_error(dir.log(id))) set_log_file(dir.log(id));
 
@@ -121,7 +124,7 @@ TrialEnd perform_trial(const std::string& path, const std::string& id, bool quie
   const auto finish = [&](TrialState state, const std::string& error, bool early = false) {
     if (lease->lost()) throw WorkError(busy(id, Lease::holder(dir.lease(id))));
     const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
-    write_result(dir, trial, state, error, outcome, took.count(), early);
+    write_result(dir, trial, state, error, outcome, before + took.count(), early);
   };
   const auto watcher = early_stopper(dir, trial);
   TrainOptions training;

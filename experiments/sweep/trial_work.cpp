@@ -5,14 +5,16 @@
 #include <cmath>
 #include <filesystem>
 #include <set>
+#include <sstream>
 
 #include "autograd/base/interrupt.h"
 #include "autograd/base/log.h"
 #include "autograd/kernels/matmul_precision.h"
 #include "datasets/benchmark/manifest.h"
-#include "experiments/benchmark_sets.h"
-#include "experiments/evaluation.h"
+#include "experiments/evaluation/benchmark_sets.h"
+#include "experiments/evaluation/evaluation.h"
 #include "experiments/slow_work.h"
+#include "experiments/sweep/early_stop.h"
 #include "nn/config/config.h"
 #include "train/training/training.h"
 
@@ -90,6 +92,7 @@ BenchmarkOptions benchmark_options(const TrainConfig& config) {
   how.steady_bones = config.evaluation.steady_bones;
   how.keep_limbs = config.evaluation.keep_limbs;
   how.any_size = config.evaluation.any_size;
+  how.any_way_up = config.evaluation.any_way_up;
   return how;
 }
 
@@ -103,6 +106,42 @@ Json evaluate_benchmark(const Bundle& models, const Evaluate& evaluate, const Tr
     const SystemScores scores =
         evaluate_benchmark_set(models, evaluate.benchmark, set, how, &names);
     out[set] = scores_json(scores, names);
+  }
+  return out;
+}
+
+/// The lines of a metrics.jsonl that are validations: those with the first of a stage's figures
+/// that there is. Losses of other lines may have names of figures.
+std::string validations_of(const std::string& metrics_jsonl, const StageType& stage) {
+  for (const std::string& figure : stage.figures) {
+    std::string out;
+    std::istringstream lines(metrics_jsonl);
+    for (std::string line; std::getline(lines, line);)
+      if (line.find("\"" + figure + "\"") != std::string::npos) out += line + "\n";
+    if (!out.empty()) return out;
+  }
+  return "";
+}
+
+/// How long a stage was trained, and what its validations said.
+Json training_json(const Store& store, const StageId& stage, const StageSection& section) {
+  const ConfigNode tree = parse_yaml(resolved_yaml(section.config), stage.stage);
+  Json out = Json::object();
+  if (const ConfigNode* optimiser = tree.find("optimiser"))
+    for (const char* key : {"steps", "batch"})
+      if (const ConfigNode* value = optimiser->find(key)) out[key] = std::stoll(value->text);
+  out["curves"] = Json::array();
+  const StageType& type = stage_type(stage.stage);
+  const std::string log = validations_of(store.metrics(stage), type);
+  for (const std::string& figure : type.figures) {
+    Json points = Json::array();
+    for (const CurvePoint& point : read_curve(log, figure))
+      if (std::isfinite(point.value)) {
+        // Some stages log a figure of training under the name of the validation's, before it.
+        if (!points.empty() && points.back()[0] == point.done) points.erase(points.size() - 1);
+        points.push_back({point.done, point.value});
+      }
+    if (!points.empty()) out["curves"].push_back({{"figure", figure}, {"points", points}});
   }
   return out;
 }
@@ -228,7 +267,10 @@ TrialOutcome run_trial(const std::string& config_yaml_path, const std::string& i
   Identities identities;
   const StoreTraining trained =
       train_in_store(Store(store), config, &identities, options, last_stage);
-  for (const StageId& s : trained.artifacts) out.artifacts[s.stage] = s.id;
+  for (const StageId& s : trained.artifacts) {
+    out.artifacts[s.stage] = s.id;
+    out.training[s.stage] = training_json(Store(store), s, config.section(s.stage));
+  }
   if (!last_stage.empty()) return out;
   throw_if_stopped();
   out.metrics = evaluate.benchmark.empty() ? evaluate_held_out(trained.bundle, config)

@@ -59,6 +59,8 @@ bool artifact_there(const std::string& store, const std::string& stage, const st
 struct TrialOutcome {
   std::map<std::string, std::string> artifacts;  ///< stage to id
   Json metrics = Json::object();  ///< {set: {"mean": {...}, "sequences": [{"name", ...}]}}
+  /// {stage: {"steps", "batch", "curves": [{"figure", "points": [[step, value]]}]}}
+  Json training = Json::object();
 };
 
 /// Trains what is missing in the store and evaluates. `id`: InputError if the trial is another one

@@ -27,6 +27,12 @@ void Mailbox::refuse() {
   ++counts_.refused;
 }
 
+void Mailbox::leave_out() {
+  const std::lock_guard lock(mutex_);
+  ++counts_.arrived;
+  ++counts_.other_sender;
+}
+
 void Mailbox::close() {
   {
     const std::lock_guard lock(mutex_);

@@ -32,6 +32,8 @@ class Mailbox {
   void pass(int64_t clouds);
   /// Counts a cloud that arrived but is none.
   void refuse();
+  /// Counts a cloud of a sender that is not heard, because another one is sending.
+  void leave_out();
   /// No more clouds will be put.
   void close();
 
@@ -41,9 +43,10 @@ class Mailbox {
   bool ended() const;
 
   struct Counts {
-    int64_t arrived = 0;    ///< all clouds
-    int64_t overtaken = 0;  ///< of them those that a newer one took the place of
-    int64_t refused = 0;    ///< of them those that were none
+    int64_t arrived = 0;       ///< all clouds
+    int64_t overtaken = 0;     ///< of them those that a newer one took the place of
+    int64_t refused = 0;       ///< of them those that were none
+    int64_t other_sender = 0;  ///< of them those of senders that were not heard
   };
   Counts counts() const;
 

@@ -106,15 +106,19 @@ class FolderWatch {
     cloud_.arrived = now;
     cloud_.seconds = std::chrono::duration<double>(now.time_since_epoch()).count();
     cloud_.sender = 1;
-    cloud_.left_out = 0;
+    int64_t before = 0;
     try {
-      cloud_.points = files_.read(cloud_.name, cloud_.left_out);
+      before = files_.read(cloud_.name, cloud_);
     } catch (const std::exception& fault) {
       if (!tried_) tried_ = Tried{names.back(), fault.what(), now};
       tried_->why = fault.what();
       return;
     }
     tried_.reset();
+    if (before > 0)
+      words_.warn("many clouds", cloud_.name + " holds " + std::to_string(before + 1) +
+                                     " clouds, and the last is taken; write one cloud a file");
+    to_.pass(before);
     to_.put(cloud_);
   }
 

@@ -18,17 +18,17 @@ namespace {
 
 constexpr size_t kChunk = 1 << 16;      // bytes that are read at once
 constexpr size_t kMostConnections = 8;  // that are open at once
-constexpr std::chrono::seconds kSilence{2};
 
 /// Says once that a sender is silent, when it has been for a while.
 class Silence {
  public:
+  bool lasts() const { return Clock::now() - last_ >= kSilence; }
   void heard() {
     last_ = Clock::now();
     said_ = false;
   }
   void check(bool in_frame, Words& words) {
-    if (said_ || Clock::now() - last_ < kSilence) return;
+    if (said_ || !lasts()) return;
     said_ = true;
     words.warn("silence", std::string("the sender has been silent for two seconds") +
                               (in_frame ? ", in the middle of a frame" : "") +
@@ -49,12 +49,13 @@ struct Sender {
   bool whole = false;  ///< it has sent a frame
 
   enum class State { open, ended, garbage };
-  /// Reads what is there.
-  State read(std::span<unsigned char> buffer, Mailbox& to, Words& words, const std::string& name);
+  /// Reads what is there. `heard` is asked with every frame: whether the frame counts.
+  State read(std::span<unsigned char> buffer, Mailbox& to, Words& words, const std::string& name,
+             const std::function<bool()>& heard);
 };
 
 Sender::State Sender::read(std::span<unsigned char> buffer, Mailbox& to, Words& words,
-                           const std::string& name) {
+                           const std::string& name, const std::function<bool()>& heard) {
   const ssize_t got = ::read(fd, buffer.data(), buffer.size());
   if (got < 0 && (errno == EINTR || errno == EAGAIN)) return State::open;
   if (got <= 0) {
@@ -71,6 +72,7 @@ Sender::State Sender::read(std::span<unsigned char> buffer, Mailbox& to, Words& 
   };
   const auto deliver = [&](LiveCloud& cloud) {
     whole = true;
+    if (!heard()) return to.leave_out();
     cloud.sender = number;
     cloud.name = name;
     to.put(cloud);
@@ -131,7 +133,7 @@ void PipeInput::run(int stop, Mailbox& to, Words& words) {
       sender.silence.check(sender.parser.in_frame(), words);
       continue;
     }
-    const Sender::State state = sender.read(buffer, to, words, name_);
+    const Sender::State state = sender.read(buffer, to, words, name_, [] { return true; });
     if (state == Sender::State::garbage && !sender.whole)
       throw InputError(name_, "holds no frame", "send frames as docs/stream.md says");
     if (state != Sender::State::open) return;
@@ -140,7 +142,7 @@ void PipeInput::run(int stop, Mailbox& to, Words& words) {
 
 namespace {
 
-/// The connections of a socket; the one whose first whole frame came last is the one that counts.
+/// The connections of a socket, of which one is heard.
 class Connections {
  public:
   Connections(int listener, Mailbox& to, Words& words)
@@ -160,7 +162,6 @@ class Connections {
       if (!wait_for(all)) return;
       auto one = open_.begin();
       for (size_t k = 2; k < all.size(); ++k) one = serve(one, all[k].revents != 0);
-      if (counts_ != 0) close_others();
       if (all[1].revents != 0) accept_one();
     } while (true);
   }
@@ -171,30 +172,31 @@ class Connections {
       one->silence.check(one->parser.in_frame(), words_);
       return std::next(one);
     }
-    const bool before = one->whole;
-    const auto state = one->read(buffer_, to_, words_, "sender " + std::to_string(one->number));
-    if (one->whole && !before) counts_ = one->number;
+    const auto state = one->read(buffer_, to_, words_, name_of(one->number),
+                                 [&] { return is_heard(one->number); });
     if (state == Sender::State::open) return std::next(one);
     if (state == Sender::State::ended && !one->parser.in_frame())
-      words_.warn("ended", "sender " + std::to_string(one->number) +
-                               " has ended; the stream waits for the next");
+      words_.warn("ended", name_of(one->number) + " has ended; the stream waits for the next");
     close(one->fd);
     return open_.erase(one);
   }
 
-  /// A sender that has only now sent a whole frame takes the place of all others.
-  void close_others() {
-    for (auto one = open_.begin(); one != open_.end();) {
-      if (one->number == counts_ || !one->whole) {
-        ++one;
-        continue;
-      }
-      words_.warn("taken over", "sender " + std::to_string(counts_) +
-                                    " takes the place of sender " + std::to_string(one->number));
-      close(one->fd);
-      one = open_.erase(one);
+  static std::string name_of(int64_t number) { return "sender " + std::to_string(number); }
+
+  /// Whether a sender that has just sent a whole frame is heard; it may take the place of another.
+  bool is_heard(int64_t number) {
+    if (number == heard_) return true;
+    const auto other = std::find_if(open_.begin(), open_.end(),
+                                    [&](const Sender& s) { return s.number == heard_; });
+    if (other != open_.end() && !other->silence.lasts()) {
+      words_.warn("not heard", name_of(number) + " is not heard: " + name_of(heard_) +
+                                   " is sending; end one of the two");
+      return false;
     }
-    counts_ = 0;
+    if (other != open_.end())
+      words_.warn("taken over", name_of(number) + " takes the place of " + name_of(heard_));
+    heard_ = number;
+    return true;
   }
 
   void accept_one() {
@@ -208,7 +210,9 @@ class Connections {
     if (open_.size() == kMostConnections) {  // those that never sent a frame go first
       auto oldest =
           std::find_if(open_.begin(), open_.end(), [](const Sender& s) { return !s.whole; });
-      if (oldest == open_.end()) oldest = open_.begin();
+      if (oldest == open_.end())
+        oldest = std::find_if(open_.begin(), open_.end(),
+                              [&](const Sender& s) { return s.number != heard_; });
       close(oldest->fd);
       open_.erase(oldest);
     }
@@ -222,7 +226,7 @@ class Connections {
   std::list<Sender> open_;
   Clock::time_point full_until_{};  ///< nobody is let in until then
   int64_t last_ = 0;                ///< number of the last sender
-  int64_t counts_ = 0;  ///< number of a sender whose first whole frame has just come; 0: none
+  int64_t heard_ = 0;               ///< number of the sender that is heard; 0: none has been
 };
 
 }  // namespace

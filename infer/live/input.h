@@ -12,6 +12,9 @@
 
 namespace restage::live {
 
+/// So long a sender may say nothing before another one takes its place.
+inline constexpr std::chrono::seconds kSilence{2};
+
 class CloudInput {
  public:
   CloudInput() = default;
@@ -56,10 +59,12 @@ class PipeInput final : public CloudInput {
   std::string name_;
 };
 
-/// The same on a socket that listens. Anybody may connect at any time; the clouds that count are
-/// those of the connection whose first whole frame came last; others that sent one are closed then.
-/// A sender that ends, vanishes or sends what makes no sense is told of, and the next one is waited
-/// for.
+/// Frames on a socket that listens. Anybody may connect at any time.
+/// One sender is heard at a time: the first that sends a whole frame.
+/// Another sender takes its place with a whole frame, after the one that is heard has ended or has
+/// been silent for kSilence. Until then clouds of others are left out, and a warning says so.
+/// If a sender ends, vanishes or sends what makes no sense, a warning says so, and the input waits
+/// for the next sender.
 class SocketInput final : public CloudInput {
  public:
   explicit SocketInput(std::unique_ptr<Listener> listener) : listener_(std::move(listener)) {}

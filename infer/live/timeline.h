@@ -1,5 +1,5 @@
 // Where clouds lie on the grid of 30 moments a second that a system works on
-// (docs/notes/design/stream.md).
+// (docs/decisions.md, "Live and pictures").
 #pragma once
 
 #include <cstdint>
@@ -13,11 +13,17 @@ inline constexpr int64_t kMostMissed = 10;
 /// What a cloud is to the sequence so far.
 struct Step {
   enum class Kind {
-    next,   ///< it goes on, `missed` moments of the grid after the cloud before
-    early,  ///< newer than the last cloud, but of the same moment: unless another cloud comes in
-            ///< the next `wait` seconds, it is the next moment's (take_early())
-    late,   ///< not newer than the last cloud
-    anew    ///< a sequence begins with it
+    /// The cloud goes on with the sequence. `missed` moments lie between it and the cloud before.
+    next,
+    /// The cloud is newer than the last cloud, and belongs to the same moment.
+    /// The cloud waits for `wait` seconds.
+    /// If another cloud comes in that time, the other cloud is placed instead.
+    /// If none comes, the cloud takes the next moment (take_early()).
+    early,
+    /// The cloud is not newer than the last cloud.
+    late,
+    /// A sequence begins with the cloud.
+    anew
   } kind;
   int64_t missed = 0;
   double wait = 0;

@@ -37,16 +37,6 @@ RigState placed(const Rig& rig, RigState state, const std::vector<Vec3>& cloud) 
   return state;
 }
 
-/// The pose a share `t` of the way from `a` to `b`: every local rotation turns the shortest way,
-/// the pelvis goes straight.
-Pose between(const Pose& a, const Pose& b, double t) {
-  Pose out;
-  for (size_t j = 0; j < kJoints; ++j)
-    out.local[j] = Quat(a.local[j]).slerp(t, Quat(b.local[j])).toRotationMatrix();
-  out.root = (1 - t) * a.root + t * b.root;
-  return out;
-}
-
 }  // namespace
 
 std::vector<Vec3> thinned(const Points& cloud, double width, const std::string& source) {
@@ -84,6 +74,7 @@ Registration::Registration(Mesh target, const Joints& rest, const std::string& w
   body_.joints = rest;
   rig_ = make_rig(body_.rest, rest, where, options.nodes);  // checks its input
   body_.weights = bone_distance_weights(body_.rest.vertices, rest);
+  system_rig_.emplace(SystemRig{body_.joints, body_.weights});
 }
 
 /// The candidates that are to be fitted: the pose of the frame before, if there is one, then
@@ -119,10 +110,7 @@ std::vector<RigState> Registration::starts(const std::vector<Vec3>& cloud) const
   return out;
 }
 
-Points Registration::posed(const Pose& pose) const { return linear_blend_skinning(body_, pose); }
-
-std::span<const RetargetedFrame> Registration::push(const Points& cloud,
-                                                    const std::string& source) {
+void Registration::answer(const Points& cloud, const std::string& source, const Show& show) {
   const std::vector<Vec3> points = thinned(cloud, options_.grid, source);
   std::vector<RigState> fitted = starts(points);
   std::vector<double> costs(fitted.size());
@@ -135,41 +123,19 @@ std::span<const RetargetedFrame> Registration::push(const Points& cloud,
       static_cast<size_t>(std::min_element(costs.begin(), costs.end()) - costs.begin());
   previous_ = fitted[best];
   const PosedRig posed = pose_rig(rig_, *previous_);
-  Pose pose = previous_->pose;
+  Pose& pose = frame_.pose;
+  pose = previous_->pose;
   if (options_.free_form)
     pose = refit_pose(rig_, posed, fit_free_form(rig_, posed, points, options_.free_form_options));
   source_joints_ = forward_kinematics(built(body_.joints, *previous_), pose).joints;
 
   pose.root = trajectory_scale(source_joints_, body_.joints) * source_joints_[0];
-  frames_.clear();
-  for (int64_t k = 1; k <= missed_; ++k) {
-    const double t = static_cast<double>(k) / static_cast<double>(missed_ + 1);
-    add_frame(shown_ ? between(*shown_, pose, t) : pose, true);
-  }
-  add_frame(pose, false);
-  shown_ = pose;
-  missed_ = 0;
-  return frames_;
+  show_after_gap(missed(), frame_, show);
 }
 
-std::span<const RetargetedFrame> Registration::finish() {
-  frames_.clear();
-  for (; shown_ && missed_ > 0; --missed_) add_frame(*shown_, true);
-  return frames_;
-}
-
-void Registration::restart() {
+void Registration::forget() {
+  EachCloud::forget();
   previous_.reset();
-  shown_.reset();
-  missed_ = 0;
-}
-
-void Registration::add_frame(const Pose& pose, bool filled) {
-  RetargetedFrame& out = frames_.emplace_back();
-  out.pose = pose;
-  out.joints = forward_kinematics(body_.joints, pose).joints;
-  out.vertices = Registration::posed(pose);
-  out.filled = filled;
 }
 
 }  // namespace restage

@@ -18,8 +18,8 @@
 #include <optional>
 #include <string>
 
+#include "infer/each_cloud.h"
 #include "infer/registration/free_form.h"
-#include "infer/system.h"
 
 namespace restage {
 
@@ -39,40 +39,31 @@ struct RegistrationOptions {
   FreeFormOptions free_form_options;
 };
 
-class Registration final : public System {
+class Registration final : public EachCloud {
  public:
   /// `where` names the target in errors. InputError: see make_rig().
   Registration(Mesh target, const Joints& rest, const std::string& where,
                const RegistrationOptions& options = {});
 
-  /// The target performing one frame of the source (metres, y up). Missed frames before it are
-  /// returned too, with poses between the last cloud's and this one's. The same bits for any number
-  /// of threads. UnusableCloud: see thinned().
-  std::span<const RetargetedFrame> push(const Points& cloud, const std::string& source) override;
-  void miss() override { ++missed_; }
-  std::span<const RetargetedFrame> finish() override;
-  void restart() override;
   /// The joints of the target as registered to the last cloud: in the pose and of the build of the
   /// source.
   const Joints* source_joints() const override { return &source_joints_; }
   const Mesh& target() const override { return body_.rest; }
-  const SystemRig* rig() const override { return &system_rig_; }
-  Points posed(const Pose& pose) const override;
   const Joints* target_joints() const override { return &body_.joints; }
 
  private:
+  /// The same bits for any number of threads. UnusableCloud: see thinned().
+  void answer(const Points& cloud, const std::string& source, const Show& show) override;
+  void forget() override;
+  void place(RetargetedFrame& frame) const override { place_body(body_, frame); }
   std::vector<RigState> starts(const std::vector<Vec3>& cloud) const;
-  void add_frame(const Pose& pose, bool filled);
 
   Body body_;  // the target, with bone_distance_weights()
   RegistrationOptions options_;
   Rig rig_;
   std::optional<RigState> previous_;  // fitted to the last cloud
-  std::optional<Pose> shown_;         // of the target, for the last cloud
-  int64_t missed_ = 0;                // frames of the source since the last cloud
   Joints source_joints_;
-  SystemRig system_rig_{body_.joints, body_.weights};
-  std::vector<RetargetedFrame> frames_;  // of the last push
+  RetargetedFrame frame_;  // of the last cloud
 };
 
 }  // namespace restage

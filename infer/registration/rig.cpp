@@ -6,6 +6,7 @@
 #include <numeric>
 
 #include "autograd/base/error.h"
+#include "nn/geometry/normals.h"
 
 namespace restage {
 namespace {
@@ -54,18 +55,6 @@ std::vector<size_t> spread(const Points& points, size_t count) {
       nearest[i] = first ? d : std::min(nearest[i], d);
     }
   }
-  return out;
-}
-
-std::vector<Vec3> normals_of(const Mesh& mesh) {
-  std::vector<Vec3> out(mesh.vertices.size(), Vec3::Zero());
-  for (const Triangle& t : mesh.faces) {
-    const auto at = [&](size_t k) { return mesh.vertices[t[k]].cast<double>(); };
-    const Vec3 normal = (at(1) - at(0)).cross(at(2) - at(0));
-    for (const int32_t v : t) out[v] += normal;
-  }
-  for (Vec3& n : out)
-    if (n.norm() > 0) n.normalize();
   return out;
 }
 
@@ -124,7 +113,7 @@ Rig make_rig(const Mesh& target, const Joints& rest, const std::string& where, s
     throw InputError(
         where, "holds " + std::to_string(chosen.size()) + " distinct points, too few for a body",
         "give at least " + std::to_string(kLeastRigPoints));
-  const std::vector<Vec3> normals = normals_of(target);
+  const auto normals = vertex_normals<Vec3>(target.vertices, target.faces, Vec3::Zero());
   Points places;
   for (const size_t v : chosen) places.push_back(target.vertices[v]);
   const SkinWeights weights = bone_distance_weights(places, rest);

@@ -1,7 +1,12 @@
 #include "infer/render/frame_store.h"
 
+#include <fcntl.h>
+#include <unistd.h>
+
 #include <cerrno>
+#include <cstdlib>
 #include <cstring>
+#include <filesystem>
 #include <string>
 
 #include "autograd/base/error.h"
@@ -11,12 +16,25 @@ namespace {
 
 [[noreturn]] void fail() {
   throw WorkError(std::string("a temporary file for long sequences failed (") +
-                  std::strerror(errno) + "); free some space and run it again");
+                  std::strerror(errno) +
+                  "); free some space, or give TMPDIR a folder that has some");
+}
+
+/// In the folder that TMPDIR names, which std::tmpfile() does not ask.
+std::FILE* open_temporary() {
+  std::error_code error;
+  std::string path =
+      (std::filesystem::temp_directory_path(error) / "restage-frames-XXXXXX").string();
+  if (error) errno = error.value();
+  const int file = error ? -1 : ::mkostemp(path.data(), O_CLOEXEC);
+  if (file < 0) return nullptr;
+  ::unlink(path.c_str());
+  return ::fdopen(file, "w+b");
 }
 
 }  // namespace
 
-TemporaryFile::TemporaryFile() : file_(std::tmpfile(), std::fclose) {
+TemporaryFile::TemporaryFile() : file_(open_temporary(), std::fclose) {
   if (!file_) fail();
 }
 

@@ -15,8 +15,8 @@
 
 namespace restage {
 
-/// A file without a name that goes away with its last user. WorkError: it cannot be made or written
-/// (disk full).
+/// A file without a name, in the system's temporary folder (TMPDIR), that goes away with its last
+/// user. WorkError: it cannot be made or written (disk full).
 class TemporaryFile {
  public:
   TemporaryFile();

@@ -6,6 +6,7 @@
 
 #include "infer/render/shadow.h"
 #include "infer/render/srgb.h"
+#include "nn/geometry/normals.h"
 
 namespace restage {
 namespace {
@@ -24,19 +25,6 @@ float grid_line(float x, float half_width) {
   constexpr float step = 0.5f;
   const float off = std::abs(x - step * std::round(x / step));
   return 1 - smooth_step(half_width * 0.6f, half_width * 1.4f, off);
-}
-
-/// `smooth`: Appearance::smooth, or empty.
-Points vertex_normals(const Points& vertices, const std::vector<Triangle>& faces,
-                      const std::vector<int32_t>& smooth = {}) {
-  Points normals(vertices.size(), Point::Zero());
-  for (const Triangle& f : faces) {
-    const Point n = (vertices[f[1]] - vertices[f[0]]).cross(vertices[f[2]] - vertices[f[0]]);
-    for (const int32_t v : f) normals[smooth.empty() ? v : smooth[v]] += n;
-  }
-  for (Point& n : normals) n = n.norm() > 0 ? Point(n.normalized()) : Point(0, 1, 0);
-  for (size_t v = 0; v < smooth.size(); ++v) normals[v] = normals[smooth[v]];
-  return normals;
 }
 
 }  // namespace
@@ -156,7 +144,7 @@ void Canvas::fill_triangle(const Projected* c, const Paint& paint) {
 
 void Canvas::draw_mesh(const Points& vertices, const std::vector<Triangle>& faces,
                        const Colour& colour) {
-  const Points normals = vertex_normals(vertices, faces);
+  const Points normals = vertex_normals<Point>(vertices, faces, Point::UnitY());
   std::vector<Projected> projected(vertices.size());
   for (size_t v = 0; v < vertices.size(); ++v) projected[v] = project(vertices[v]);
   for (const Triangle& f : faces) {
@@ -218,7 +206,7 @@ std::vector<Canvas::Facet> Canvas::facets(const Points& vertices,
 
 void Canvas::draw_surface(const Points& vertices, const std::vector<Triangle>& faces,
                           const Appearance& look, const Pictures& pictures) {
-  const Points normals = vertex_normals(vertices, faces, look.smooth);
+  const Points normals = vertex_normals<Point>(vertices, faces, Point::UnitY(), look.smooth);
   for (const Facet& facet : facets(vertices, faces, look)) {
     const Triangle& f = *facet.face;
     const Material& material = *facet.material;

@@ -9,6 +9,7 @@
 #include "infer/writers/glb_detail.h"
 #include "nn/geometry/glb_file.h"
 #include "nn/geometry/mesh_file.h"
+#include "nn/geometry/normals.h"
 
 namespace restage {
 namespace {
@@ -18,24 +19,6 @@ using glb::Json;
 using glb::three;
 
 constexpr float kNegligible = 1e-6f;  // a joint with a smaller weight is left out
-
-/// Unit normals of the vertices: means over the faces around a vertex, weighted by area. A vertex
-/// without faces gets a normal that points straight up.
-Points vertex_normals(const Mesh& mesh) {
-  std::vector<Vec3> sums(mesh.vertices.size(), Vec3::Zero());
-  for (const Triangle& f : mesh.faces) {
-    const Vec3 a = mesh.vertices[f[0]].cast<double>(), b = mesh.vertices[f[1]].cast<double>(),
-               c = mesh.vertices[f[2]].cast<double>();
-    const Vec3 normal = (b - a).cross(c - a);
-    for (const int32_t v : f) sums[v] += normal;
-  }
-  Points normals(sums.size());
-  for (size_t v = 0; v < sums.size(); ++v) {
-    const double length = sums[v].norm();
-    normals[v] = length > 1e-30 ? Point((sums[v] / length).cast<float>()) : Point(0, 1, 0);
-  }
-  return normals;
-}
 
 Json mesh_primitive(Buffer& buffer, const Mesh& mesh, const Influences& influences) {
   const size_t count = mesh.vertices.size();
@@ -47,7 +30,9 @@ Json mesh_primitive(Buffer& buffer, const Mesh& mesh, const Influences& influenc
   buffer.set_bounds(positions, three(low), three(high));
   attributes["POSITION"] = positions;
   if (!mesh.faces.empty()) {
-    const Points normals = vertex_normals(mesh);
+    Points normals;
+    for (const Vec3& n : vertex_normals<Vec3>(mesh.vertices, mesh.faces, Vec3::UnitY()))
+      normals.push_back(n.cast<float>());
     attributes["NORMAL"] =
         buffer.add(normals.data(), count * 12, count, glb::f32, "VEC3", glb::vertices);
   }

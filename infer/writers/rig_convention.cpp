@@ -138,7 +138,7 @@ const std::vector<std::string>& rig_conventions() {
 void check_convention(const std::string& name) {
   const auto& all = rig_conventions();
   if (std::find(all.begin(), all.end(), name) == all.end())
-    throw InputError("", "--skeleton '" + name + "' is unknown",
+    throw InputError("", "{skeleton} '" + name + "' is unknown",
                      "use restage, smpl, mixamo, vrm or unreal");
 }
 

@@ -6,21 +6,14 @@
 #include <cmath>
 
 #include "autograd/base/nearest.h"
+#include "autograd/base/words.h"
 
 namespace restage {
 namespace {
 
 using Kind = ConfigNode::Kind;
 
-std::string joined(const std::vector<std::string>& words) {
-  constexpr size_t kLongest = 150;  // an error is one line of less than 400 characters
-  std::string out;
-  for (const auto& word : words) {
-    if (out.size() + word.size() > kLongest) return out + ", ...";
-    out += (out.empty() ? "" : ", ") + word;
-  }
-  return out;
-}
+constexpr size_t kLongest = 150;  // an error is one line of less than 400 characters
 
 /// What the file holds, for "got ...".
 std::string got(const ConfigNode& node) {
@@ -179,7 +172,7 @@ std::string leaf_type(bool, const Rule&) { return "true or false"; }
 std::string leaf_type(int64_t, const Rule& rule) { return "a whole number" + range_text(rule); }
 std::string leaf_type(double, const Rule& rule) { return "a number" + range_text(rule); }
 std::string leaf_type(const std::string&, const Rule& rule) {
-  return rule.choices.empty() ? "text" : "one of " + joined(rule.choices);
+  return rule.choices.empty() ? "text" : "one of " + cut_list(rule.choices, kLongest);
 }
 
 }  // namespace config_detail
@@ -211,7 +204,7 @@ void ConfigReader::finish() const {
       const std::string close = nearest(entry.key, known_);
       throw InputError(entry.key_place.text(), "unknown key " + in_quotes(full(entry.key)),
                        known_.empty()  ? "there are no keys here; " + path_ + "={} leaves them out"
-                       : close.empty() ? "the keys here are " + joined(known_)
+                       : close.empty() ? "the keys here are " + cut_list(known_, kLongest)
                                        : "did you mean " + in_quotes(close) + "?");
     }
   }

@@ -222,9 +222,9 @@ std::string config_to_yaml(const ConfigNode& root) {
 }
 
 std::string in_quotes(std::string_view text) {
-  constexpr size_t kLongest = 40;
-  if (text.size() <= kLongest) return "'" + escaped(text, false) + "'";
-  size_t cut = kLongest - 3;  // never inside a UTF-8 character
+  constexpr size_t kMost = 40;
+  if (text.size() <= kMost) return "'" + escaped(text, false) + "'";
+  size_t cut = kMost - 3;  // never inside a UTF-8 character
   while (cut > 0 && (static_cast<unsigned char>(text[cut]) & 0xc0) == 0x80) --cut;
   return "'" + escaped(text.substr(0, cut), false) + "...'";
 }

@@ -30,6 +30,14 @@ Rotations to_global(const Rotations& local) {
   return out;
 }
 
+Pose between(const Pose& a, const Pose& b, double t) {
+  Pose out;
+  for (size_t j = 0; j < kJoints; ++j)
+    out.local[j] = Quat(a.local[j]).slerp(t, Quat(b.local[j])).toRotationMatrix();
+  out.root = (1 - t) * a.root + t * b.root;
+  return out;
+}
+
 std::array<std::array<double, 4>, kJoints> quaternions(const Rotations& rotations) {
   std::array<std::array<double, 4>, kJoints> out;
   for (size_t j = 0; j < kJoints; ++j) {
@@ -45,6 +53,11 @@ double leg_length(const Joints& x) {
     return (x[hip] - x[knee]).norm() + (x[knee] - x[ankle]).norm();
   };
   return 0.5 * (side(1, 4, 7) + side(2, 5, 8));
+}
+
+double trunk_turn(const Joints& a, const Joints& b) {
+  const Vec3 one = a[kNeck] - a[kPelvis], other = b[kNeck] - b[kPelvis];
+  return std::atan2(one.cross(other).norm(), one.dot(other));
 }
 
 namespace {

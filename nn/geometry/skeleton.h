@@ -50,6 +50,10 @@ struct Pose {
   Vec3 root = Vec3::Zero();  ///< world position of the pelvis
 };
 
+/// The pose a share `t` of the way from `a` to `b`: every local rotation turns the shortest way,
+/// the pelvis goes straight.
+Pose between(const Pose& a, const Pose& b, double t);
+
 struct PosedSkeleton {
   Rotations global;
   Joints joints;
@@ -64,6 +68,8 @@ Rotations to_global(const Rotations& local);
 std::array<std::array<double, 4>, kJoints> quaternions(const Rotations& rotations);
 /// Hip-knee plus knee-ankle, mean of both sides (spec 3.3), metres.
 double leg_length(const Joints& joints);
+/// Angle between the trunks of two poses, from the pelvis to the neck, radians.
+double trunk_turn(const Joints& a, const Joints& b);
 /// Angle about y by which a posed body faces away from +z (spec 3.3: across = left minus right
 /// shoulder plus left minus right hip), radians; 0 if it cannot be told.
 double heading_angle(const Joints& joints);

@@ -24,7 +24,7 @@ Var Linear::operator()(Context& ctx, const Var& x, Activation activation) const 
   const ModuleScope path(scope);
   const Var w = matrix(ctx);
   if (with_bias_) return linear(x, w, ctx.bind(bias), activation);
-  return linear(x, w);
+  return call(LinearOp{activation}, {x, w});
 }
 
 void Linear::start_small() {

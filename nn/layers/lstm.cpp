@@ -35,9 +35,9 @@ Var LstmLayer::operator()(Context& ctx, const Var& x, Var* hidden, Var* cell) co
     for (int64_t s = 0; s < t; ++s) {
       const Var gates = reshape(slice(all, 1, s, s + 1), {n, 4 * hidden_}) +
                         linear(h, ctx.bind(w->w_hh), ctx.bind(w->b_hh));
-      const auto gate = [&](int64_t k) { return slice(gates, 1, k * hidden_, (k + 1) * hidden_); };
-      c = sigmoid(gate(1)) * c + sigmoid(gate(0)) * tanh(gate(2));
-      h = sigmoid(gate(3)) * tanh(c);
+      const Vars gate = split(gates, 1, {hidden_, hidden_, hidden_, hidden_});
+      c = sigmoid(gate[1]) * c + sigmoid(gate[0]) * tanh(gate[2]);
+      h = sigmoid(gate[3]) * tanh(c);
       steps.push_back(reshape(h, {n, 1, hidden_}));
     }
     in = concat(std::span<const Var>(steps), 1);

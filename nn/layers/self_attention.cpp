@@ -21,9 +21,8 @@ Var EncoderLayer::attention(Context& ctx, const Var& x) const {
   const int64_t n = x.size(0), t = x.size(1), width = x.size(2), per_head = width / heads_;
   // [n, t, 3, heads, c] -> [3, n * heads, t, c]
   const Var all = permute(reshape(qkv(ctx, x), {n, t, 3, heads_, per_head}), {2, 0, 3, 1, 4});
-  const auto part = [&](int64_t i) {
-    return reshape(slice(all, 0, i, i + 1), {n * heads_, t, per_head});
-  };
+  const Vars parts = split(all, 0, {1, 1, 1});
+  const auto part = [&](size_t i) { return reshape(parts[i], {n * heads_, t, per_head}); };
   const double factor = 1.0 / std::sqrt(static_cast<double>(per_head));
   const Var mixed =
       reshape(cross_attention(part(0), part(1), part(2), factor), {n, heads_, t, per_head});

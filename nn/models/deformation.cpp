@@ -49,9 +49,9 @@ Var Mlp3::at_points(Context& ctx, const Var& vector, const Var& points) const {
       const int64_t at = (i * v + j) * n + i;
       points.dtype() == DType::f64 ? one.data<double>()[at] = 1 : one.data<float>()[at] = 1;
     }
-  const Var w = ctx.bind(fc1.weight);
-  const Var of_vectors = linear(vector, slice(w, 1, 0, c), ctx.bind(fc1.bias));
-  const Var both = concat({slice(w, 1, c, c + 3), permute(of_vectors, {1, 0})}, 1);
+  const Vars w = split(ctx.bind(fc1.weight), 1, {c, 3});
+  const Var of_vectors = linear(vector, w[0], ctx.bind(fc1.bias));
+  const Var both = concat({w[1], permute(of_vectors, {1, 0})}, 1);
   const Var x = concat({points, Var(one.to(points.value.device()))}, 2);
   return from_first(ctx, hidden(ctx, [&](Activation a) { return call(LinearOp{a}, {x, both}); }));
 }

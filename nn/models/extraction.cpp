@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "autograd/base/log.h"
+#include "autograd/base/words.h"
 #include "nn/geometry/strays.h"
 
 namespace restage {
@@ -11,7 +12,38 @@ namespace {
 
 constexpr double kLost = 1;  // metres: nobody moves so far from one frame to the next
 
-bool mirrored(size_t view) { return view % 2 == 1; }
+constexpr double kTilted = 35 * M_PI / 180;  // of the trunk, from which on somebody is stood up
+constexpr double kUnsure = 0.6;              // confidence below which other ways up are looked at
+constexpr double kVerySure = 0.95;           // the same of a first frame
+constexpr double kSurer = 0.8;  // another way up is believed if its uncertainty is so much less
+
+/// The least turn that lets the trunk point up; exactly the identity where it nearly does.
+Mat3 standing(const Joints& joints) {
+  const Vec3 trunk = joints[kNeck] - joints[0];
+  if (!(trunk.norm() > 1e-6)) return Mat3::Identity();
+  const Vec3 along = trunk.normalized();
+  if (!(std::acos(std::clamp(along.y(), -1.0, 1.0)) > kTilted)) return Mat3::Identity();
+  return Quat::FromTwoVectors(along, Vec3::UnitY()).toRotationMatrix();
+}
+
+/// How unsure an answer is, metres. A trunk that points elsewhere than in the frame before, which
+/// was sure, counts as an answer that is half as sure.
+double doubt(const SeenJoints& now, const SeenJoints* before) {
+  constexpr double kMostTurned = 60 * M_PI / 180, kJump = 2;
+  const double unsure = mean_uncertainty(*now.uncertainty);
+  if (before == nullptr || !before->uncertainty || confidence(*before->uncertainty) < kUnsure)
+    return unsure;
+  return trunk_turn(now.joints, before->joints) > kMostTurned ? kJump * unsure : unsure;
+}
+
+/// As it is, on either side, on the back and on the face, and upside down.
+std::array<Mat3, 6> ways_up() {
+  const auto about = [](const Vec3& axis, double quarters) {
+    return Mat3(Eigen::AngleAxisd(quarters * M_PI / 2, axis));
+  };
+  const Vec3 x = Vec3::UnitX(), z = Vec3::UnitZ();
+  return {Mat3::Identity(), about(x, 1), about(x, -1), about(z, 1), about(z, -1), about(x, 2)};
+}
 
 /// From the ankles to the head along the bones, whatever the pose.
 double tallness(const Joints& joints) {
@@ -37,19 +69,24 @@ double scale_for(const Joints& joints) {
 
 }  // namespace
 
-JointExtractor::JointExtractor(SkeletonModel& model, int samples, double around, bool keep_limbs,
-                               bool any_size)
-    : model_(model),
-      device_(device_of(model)),
-      around_(around),
-      keep_limbs_(keep_limbs),
-      any_size_(any_size),
-      centres_(static_cast<size_t>(samples)),
-      views_(static_cast<size_t>(samples)) {}
+JointExtractor::JointExtractor(SkeletonModel& model, const LookOptions& options)
+    : model_(model), device_(device_of(model)), options_(options) {
+  stand_up(Mat3::Identity());
+}
 
 double JointExtractor::heading(size_t view) const {
-  const size_t pairs = (centres_.size() + 1) / 2, pair = view / 2;
-  return around_ * ((static_cast<double>(pair) + 0.5) / static_cast<double>(pairs) - 0.5);
+  const auto samples = static_cast<size_t>(options_.samples);
+  const size_t pairs = (samples + 1) / 2, pair = view / 2;
+  return options_.around * ((static_cast<double>(pair) + 0.5) / static_cast<double>(pairs) - 0.5);
+}
+
+/// From now on the cloud is shown turned so.
+void JointExtractor::stand_up(const Mat3& upright) {
+  upright_ = upright;
+  sights_.clear();
+  for (size_t s = 0; s < static_cast<size_t>(options_.samples); ++s)
+    sights_.push_back({turn_about_y(heading(s)) * upright,
+                       upright.transpose() * turn_about_y(-heading(s)), s % 2 == 1});
 }
 
 void JointExtractor::arrange(const Points& cloud, const std::string& source) {
@@ -58,8 +95,7 @@ void JointExtractor::arrange(const Points& cloud, const std::string& source) {
       throw UnusableCloud(source, "holds a coordinate that is not finite", "remove such points");
   const size_t strays = leave_out_strays(cloud, &kept_);
   if (strays > 0 && !told_of_strays_)
-    log_warning(source + ": left out " + std::to_string(strays) +
-                (strays == 1 ? " point" : " points") +
+    log_warning(source + ": left out " + counted(strays, "point") +
                 " more than 5 m from the middle of the others (this is said once)");
   told_of_strays_ = told_of_strays_ || strays > 0;
   points_.arrange(strays > 0 ? kept_ : cloud);
@@ -73,24 +109,88 @@ SeenJoints JointExtractor::operator()(const Points& cloud, const std::string& so
                                       const RngKey& key, const SeenJoints* before) {
   constexpr int kMostLooks = 5;  // who is very small looks larger than life at first
   arrange(cloud, source);
-  scale_ = any_size_ && before != nullptr ? scale_for(before->joints) : 1;
-  SeenJoints out = look(source, key, before);
-  for (int looks = 1; any_size_ && before == nullptr && looks < kMostLooks; ++looks) {
+  scale_ = options_.any_size && before != nullptr ? scale_for(before->joints) : 1;
+  stand_up(before == nullptr || before->upright.isIdentity(0) ? Mat3(Mat3::Identity())
+                                                              : standing(before->joints));
+  const auto look_well = [&] {
+    const SeenJoints first = look(source, key, before);
+    return options_.any_way_up && first.uncertainty ? surest(first, source, key, before) : first;
+  };
+  SeenJoints out = look_well();
+  for (int looks = 1; options_.any_size && before == nullptr && looks < kMostLooks; ++looks) {
     const double scale = scale_for(out.joints);
     if (scale == scale_) break;
     scale_ = scale;
-    out = look(source, key, before);
+    out = look_well();
   }
   return out;
 }
 
-/// The answer to the arranged points in the scale of now.
+/// `first`, or the answer to the cloud the other way up that is clearly surer.
+SeenJoints JointExtractor::surest(const SeenJoints& first, const std::string& source,
+                                  const RngKey& key, const SeenJoints* before) {
+  // Who is seen for the first time upside down can look like somebody: more has to be sure.
+  const bool anew = confidence(*first.uncertainty) < (before == nullptr ? kVerySure : kUnsure);
+  const Mat3 now = upright_, other = anew ? surest_way_up(source, key) : standing(first.joints);
+  const double apart = Eigen::AngleAxisd(other * now.transpose()).angle();
+  stand_up(now);
+  if (apart < kTilted) return first;
+  stand_up(other);
+  const SeenJoints second = look(source, key, before);
+  if (doubt(second, before) < kSurer * doubt(first, before)) return second;
+  stand_up(now);
+  return first;
+}
+
+/// The turn that lets somebody stand, by the surest of six orientations.
+Mat3 JointExtractor::surest_way_up(const std::string& source, const RngKey& key) {
+  const std::array<Mat3, 6> ways = ways_up();
+  sights_.clear();
+  for (const Mat3& way : ways)
+    for (const bool mirrored : {false, true}) {
+      const double turn = mirrored ? M_PI / 2 : 0;
+      sights_.push_back(
+          {turn_about_y(turn) * way, way.transpose() * turn_about_y(-turn), mirrored});
+    }
+  read(ask(key, nullptr));
+  size_t best = 0;
+  double least = 0;
+  for (size_t w = 0; w < ways.size(); ++w) {
+    double logs = 0;
+    for (size_t v = 2 * w; v < 2 * w + 2; ++v)
+      for (const double log : views_[v].log_uncertainty) logs += log / (2 * kJoints);
+    if (w == 0 || logs < least) best = w, least = logs;
+  }
+  std::copy_n(views_.begin() + static_cast<std::ptrdiff_t>(2 * best), 2, views_.begin());
+  views_.resize(2);
+  return standing(combined(views_, false, true, source, values_).joints);
+}
+
+/// The answer to the arranged points in the scale and the way up of now.
 SeenJoints JointExtractor::look(const std::string& source, const RngKey& key,
                                 const SeenJoints* before) {
+  const SkeletonAnswer answer = ask(key, before);
+  read(answer);
+  std::array<int, 2> limbs{};
+  if (before != nullptr) {
+    keep_sides(*before, &views_);
+    if (options_.keep_limbs) limbs = restage::keep_limbs(*before, &views_);
+  }
+  SeenJoints out = combined(views_, answer.turns.value.defined(),
+                            answer.uncertainty.value.defined(), source, values_);
+  remember_sides(before, &out);
+  out.exchanged = limbs;
+  out.upright = upright_;
+  return out;
+}
+
+/// The model's answer to the arranged points as sights_ show them.
+SkeletonAnswer JointExtractor::ask(const RngKey& key, const SeenJoints* before) {
   const auto n = static_cast<size_t>(model_.points());
-  const size_t views = centres_.size();
+  const size_t views = sights_.size();
   Tensor batch = Tensor::empty({static_cast<int64_t>(views), static_cast<int64_t>(n), 3});
   const double start = Rng(key).uniform();
+  centres_.resize(views);
   for (size_t s = 0; s < views; ++s) {
     const double offset = start + static_cast<double>(s) / static_cast<double>(views);
     points_.choose(n, offset - std::floor(offset), &chosen_);
@@ -98,8 +198,8 @@ SeenJoints JointExtractor::look(const std::string& source, const RngKey& key,
     centre.setZero();
     for (const Point& p : chosen_) centre += p.cast<double>();
     centre /= static_cast<double>(n);
-    const Eigen::Matrix3f turn = turn_about_y(heading(s)).cast<float>();
-    const float side = mirrored(s) ? -1.0f : 1.0f;
+    const Eigen::Matrix3f turn = sights_[s].turn.cast<float>();
+    const float side = sights_[s].mirrored ? -1.0f : 1.0f;
     float* row = batch.data<float>() + s * n * 3;
     for (size_t i = 0; i < n; ++i) {
       Eigen::Map<Point> to(row + 3 * i);
@@ -109,19 +209,7 @@ SeenJoints JointExtractor::look(const std::string& source, const RngKey& key,
   }
   Context ctx;
   const Tensor remembered = before != nullptr ? past(*before) : Tensor();
-  const SkeletonAnswer answer =
-      on_host(model_.forward(ctx, {batch.to(device_), remembered.to(device_)}));
-  read(answer);
-  std::array<int, 2> limbs{};
-  if (before != nullptr) {
-    keep_sides(*before, &views_);
-    if (keep_limbs_) limbs = restage::keep_limbs(*before, &views_);
-  }
-  SeenJoints out = combined(views_, answer.turns.value.defined(),
-                            answer.uncertainty.value.defined(), source, values_);
-  remember_sides(before, &out);
-  out.exchanged = limbs;
-  return out;
+  return on_host(model_.forward(ctx, {batch.to(device_), remembered.to(device_)}));
 }
 
 /// The joints of the frame before in the frame of each view: turned, mirrored, relative to the
@@ -132,12 +220,12 @@ Tensor JointExtractor::past(const SeenJoints& before) const {
   if (!((middle - centres_[0]).norm() < kLost)) return {};
   Tensor out = Tensor::empty({std::ssize(centres_), kJoints, 4});
   float* to = out.data<float>();
-  for (size_t s = 0; s < centres_.size(); ++s) {
-    const Mat3 turn = turn_about_y(heading(s));
+  for (size_t s = 0; s < sights_.size(); ++s) {
+    const auto& [turn, back, mirrored] = sights_[s];
     for (size_t j = 0; j < kJoints; ++j, to += 4) {
-      const size_t from = mirrored(s) ? static_cast<size_t>(kMirror[j]) : j;
+      const size_t from = mirrored ? static_cast<size_t>(kMirror[j]) : j;
       Eigen::Map<Point>{to} = (scale_ * (turn * (before.joints[from] - centres_[s]))).cast<float>();
-      if (mirrored(s)) to[0] = -to[0];
+      if (mirrored) to[0] = -to[0];
       to[3] = static_cast<float>(before.uncertainty ? trust_of(scale_ * (*before.uncertainty)[from])
                                                     : 1.0);
     }
@@ -149,19 +237,20 @@ Tensor JointExtractor::past(const SeenJoints& before) const {
 void JointExtractor::read(const SkeletonAnswer& answer) {
   const Tensor &joints = answer.joints.value, &turns = answer.turns.value,
                &uncertainty = answer.uncertainty.value;
+  views_.resize(sights_.size());
   for (size_t s = 0; s < views_.size(); ++s) {
     View& view = views_[s];
-    const Mat3 back = turn_about_y(-heading(s));
+    const auto& [turn, back, mirrored] = sights_[s];
     for (size_t j = 0; j < kJoints; ++j) {
-      const size_t row = s * kJoints + (mirrored(s) ? static_cast<size_t>(kMirror[j]) : j);
+      const size_t row = s * kJoints + (mirrored ? static_cast<size_t>(kMirror[j]) : j);
       const float* x = joints.data<float>() + row * 3;
-      view.joints[j] = back * Vec3(mirrored(s) ? -x[0] : x[0], x[1], x[2]) / scale_ + centres_[s];
+      view.joints[j] = back * Vec3(mirrored ? -x[0] : x[0], x[1], x[2]) / scale_ + centres_[s];
       view.turns[j].setZero();
       if (turns.defined()) {
         View::Columns own =
             Eigen::Map<const Eigen::Matrix<float, 3, 2>>(turns.data<float>() + row * 6)
                 .cast<double>();
-        if (mirrored(s)) {  // M R M with M = diag(-1, 1, 1)
+        if (mirrored) {  // M R M with M = diag(-1, 1, 1)
           own.row(0) *= -1;
           own.col(0) *= -1;
         }
@@ -176,8 +265,8 @@ void JointExtractor::read(const SkeletonAnswer& answer) {
 }
 
 Joints extract_joints(SkeletonModel& model, const Points& cloud, const std::string& source,
-                      const RngKey& key, int samples, double around, bool any_size) {
-  return JointExtractor(model, samples, around, false, any_size)(cloud, source, key).joints;
+                      const RngKey& key, const LookOptions& options) {
+  return JointExtractor(model, options)(cloud, source, key).joints;
 }
 
 Points surface_points(const Mesh& mesh, size_t n, const RngKey& key) {

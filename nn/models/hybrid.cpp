@@ -235,16 +235,14 @@ MotionOutput Hybrid::forward(Context& ctx, const MotionInput& in, MotionState* s
       concat({reshape(in.joints, {n, t, w}), reshape(Var(surface.twist), {n, t, kJoints}), ends,
               in.trans, uncertainty},
              2);
-  const Var calm = calmed(ctx, now, decoded, state);
-  const Var believed = slice(calm, 2, kPathAt + 3, kPathAt + 3 + kJoints);
+  const Vars calm = split(calmed(ctx, now, decoded, state), 2, {w, kJoints, 6 * kEnds, 3, kJoints});
+  const Var believed = calm[4];
   const Var off = scale(believed, 1 / kUsualUncertainty);
   const double turning = config.turn_reach * (config.orientation ? 1 : kBlind);
-  const Var moved = slice(calm, 2, 0, w) +
+  const Var moved = calm[0] +
                     scale(tanh(correction(ctx, decoded)), config.reach) * each_thrice(believed),
-            twisted =
-                slice(calm, 2, w, w + kJoints) + scale(tanh(twist(ctx, decoded)), turning) * off,
-            sixd = slice(calm, 2, w + kJoints, w + kJoints + 6 * kEnds) +
-                   scale(tanh(leaves(ctx, decoded)), turning) * of_leaves(off);
+            twisted = calm[1] + scale(tanh(twist(ctx, decoded)), turning) * off,
+            sixd = calm[2] + scale(tanh(leaves(ctx, decoded)), turning) * of_leaves(off);
 
   const Var posed = reshape(moved, {n * t, kJoints, 3});
   const Var rest_rows = rest_of_each_frame(in.rest, t);
@@ -256,8 +254,7 @@ MotionOutput Hybrid::forward(Context& ctx, const MotionInput& in, MotionState* s
   out.raw = reshape(matrix_to_sixd(local), {n, t, 6 * kJoints});
   put_pose(local, rest_rows, n, &out);
   const Var longer = reshape(leg_lengths(rest_rows) / leg_lengths(posed), {n, t, 1});
-  out.trans = slice(calm, 2, kPathAt, kPathAt + 3) * longer +
-              scale(path(ctx, decoded), kPath) * Var(units.trans.deviation);
+  out.trans = calm[3] * longer + scale(path(ctx, decoded), kPath) * Var(units.trans.deviation);
   if (contact)
     out.standing =
         (*contact)(ctx, (*footing)(ctx, Var(footing_of(in, &(*state)[7])), &(*state)[6]));

@@ -29,10 +29,8 @@ Npt::Npt(const NptConfig& c, const Init& given)
 }
 
 Var Npt::join(Context& ctx, const Var& code, const Var& mesh) const {
-  const Var w = convs[0].matrix(ctx);
-  const int64_t c = code.size(2);
-  return linear(code, slice(w, 1, 0, c)) +
-         linear(mesh, slice(w, 1, c, c + 3), ctx.bind(convs[0].bias));
+  const Vars w = split(convs[0].matrix(ctx), 1, {code.size(2), 3});
+  return linear(code, w[0]) + linear(mesh, w[1], ctx.bind(convs[0].bias));
 }
 
 Var Npt::forward(Context& ctx, const TransferInput& in) {

@@ -69,15 +69,14 @@ SkeletonOutput PatchTransformer::forward(Context& ctx, const SkeletonInput& in) 
   if (memory) x = x + (*memory)(ctx, seen_from(centres.value, in.past, config.memory_scale));
   for (size_t i = 0; i < layers.size(); ++i) x = layers[i](ctx, x);
   x = norm(ctx, x);
-  const Var head = vote(ctx, x);
-  out.votes = reshape(slice(head, 2, kJoints, 4 * kJoints), {n, t, kJoints, 3}) +
-              reshape(centres, {n, t, 1, 3});
-  const Var weight = reshape(softmax(slice(head, 2, 0, kJoints), 1), {n, t, kJoints, 1});
+  const Vars head = split(vote(ctx, x), 2, {kJoints, 3 * kJoints});
+  out.votes = reshape(head[1], {n, t, kJoints, 3}) + reshape(centres, {n, t, 1, 3});
+  const Var weight = reshape(softmax(head[0], 1), {n, t, kJoints, 1});
   out.joints = sum(weight * out.votes, 1);
   if (orientation) {
-    const Var all = (*orientation)(ctx, x);
-    const Var share = reshape(softmax(slice(all, 2, 0, kJoints), 1), {n, t, kJoints, 1});
-    out.turns = sum(share * reshape(slice(all, 2, kJoints, 7 * kJoints), {n, t, kJoints, 6}), 1);
+    const Vars all = split((*orientation)(ctx, x), 2, {kJoints, 6 * kJoints});
+    const Var share = reshape(softmax(all[0], 1), {n, t, kJoints, 1});
+    out.turns = sum(share * reshape(all[1], {n, t, kJoints, 6}), 1);
   }
   if (uncertainty) {  // learns from the tokens as they are: where joints are believed is not its to
                       // change

@@ -1,6 +1,6 @@
 #include "nn/models/registry.h"
 
-#include "autograd/base/nearest.h"
+#include "autograd/base/registry.h"
 #include "nn/models/bone_field.h"
 #include "nn/models/closed_form_motion.h"
 #include "nn/models/corenet.h"
@@ -46,8 +46,8 @@ ModelType h4d() {
   return out;
 }
 
-std::vector<ModelType>& table() {
-  static std::vector<ModelType> all = {
+std::deque<ModelType> ours() {
+  return {
       model_of<PointTransformer>("skeleton/point_transformer", "skeleton",
                                  "the paper's extractor: 4 blocks, width 512, 1024 points"),
       model_of<PointNet>("skeleton/pointnet", "skeleton",
@@ -82,30 +82,20 @@ std::vector<ModelType>& table() {
                                  "TST's discriminator, which its program never trains"),
       h4d(),
   };
+}
+
+Registry<ModelType>& table() {
+  static Registry<ModelType> all("model", ours());
   return all;
 }
 
 }  // namespace
 
-const std::vector<ModelType>& models() { return table(); }
+const std::deque<ModelType>& models() { return table().all(); }
 
-void register_model(ModelType type) {
-  for (const ModelType& known : table())
-    if (known.name == type.name) throw Error("there is a model '" + type.name + "' already");
-  table().push_back(std::move(type));
-}
+void register_model(ModelType type) { table().add(std::move(type)); }
 
-const ModelType& model_type(const std::string& name) {
-  std::vector<std::string> names;
-  for (const ModelType& type : models()) {
-    if (type.name == name) return type;
-    names.push_back(type.name);
-  }
-  const std::string near = nearest(name, names);
-  throw InputError(
-      "", "there is no model '" + name + "'",
-      near.empty() ? "'restage info --help' lists them" : "did you mean '" + near + "'?");
-}
+const ModelType& model_type(const std::string& name) { return table().get(name); }
 
 std::unique_ptr<Module> make_model(const std::string& name, const AnyConfig& config,
                                    const Init& init) {

@@ -2,6 +2,7 @@
 // pair of files here (its config struct with a visit(), the network) and one line in registry.cpp.
 #pragma once
 
+#include <deque>
 #include <memory>
 #include <string>
 #include <vector>
@@ -34,11 +35,12 @@ ModelType model_of(const char* name, const char* role, const char* help,
           }};
 }
 
-const std::vector<ModelType>& models();
+const std::deque<ModelType>& models();
 /// Adds a model of a program that uses this library, before anything else is done; model_of() makes
 /// its line. Error if there is one of that name.
 void register_model(ModelType type);
-/// The model of this name. InputError with the nearest known name if there is none.
+/// The model of this name, which stays where it is. InputError with the nearest known name if there
+/// is none.
 const ModelType& model_type(const std::string& name);
 /// Builds a network. `config` is of the type of model_type(name).config.
 std::unique_ptr<Module> make_model(const std::string& name, const AnyConfig& config,

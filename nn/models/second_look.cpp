@@ -80,12 +80,13 @@ SkeletonAnswer SecondLook::operator()(Context& ctx, const Var& cloud,
   x = norm(ctx, x);
   // One row for the place and one for each column of the rotation, in the joint's axes; the
   // transposed axes turn them back.
-  const Var correction = reshape(
-      matmul(reshape(correct(ctx, x), {rows, 3, 3}), Var(own), false, true), {n, kJoints, 9});
+  const Var all = reshape(matmul(reshape(correct(ctx, x), {rows, 3, 3}), Var(own), false, true),
+                          {n, kJoints, 9});
+  const Vars correction = split(all, 2, {3, 6});
   SkeletonAnswer out;
-  out.joints = Var(joints) + scale(slice(correction, 2, 0, 3), kCorrection);
+  out.joints = Var(joints) + scale(correction[0], kCorrection);
   if (first.turns.value.defined())
-    out.turns = matrix_to_sixd(Var(own.reshape({n, kJoints, 3, 3}))) + slice(correction, 2, 3, 9);
+    out.turns = matrix_to_sixd(Var(own.reshape({n, kJoints, 3, 3}))) + correction[1];
   // The uncertainty learns apart from the rest, as in the first look.
   if (first.uncertainty.value.defined())
     out.uncertainty =

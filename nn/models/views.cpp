@@ -103,6 +103,7 @@ SeenJoints turned(const Mat3& turn, const SeenJoints& seen) {
   if (out.turns)
     for (Mat3& r : *out.turns) r = turn * r;
   if (out.left) out.left = turn * *out.left;
+  if (!out.upright.isIdentity(0)) out.upright = out.upright * turn.transpose();
   return out;
 }
 
@@ -113,6 +114,12 @@ double confidence(const std::array<double, kJoints>& uncertainty) {
     sum += 1 - std::exp(-r) * (1 + r + r * r / 2);
   }
   return sum / kJoints;
+}
+
+double mean_uncertainty(const std::array<double, kJoints>& uncertainty) {
+  double logs = 0;
+  for (const double s : uncertainty) logs += std::log(s) / kJoints;
+  return std::exp(logs);
 }
 
 std::array<double, kJoints> radius_of_90(const std::array<double, kJoints>& uncertainty) {

@@ -33,6 +33,9 @@ struct SeenJoints {
   /// For how many frames in a row most views of the legs, of the arms, were exchanged by
   /// keep_limbs().
   std::array<int, 2> exchanged{};
+  /// Turns the cloud's frame into the one in which the extractor saw somebody stand
+  /// (docs/method.md, "Any way up"). Exactly the identity for who stands.
+  Mat3 upright = Mat3::Identity();
 };
 SeenJoints turned(const Mat3& turn, const SeenJoints& seen);
 
@@ -40,6 +43,8 @@ inline constexpr double kNearby = 0.05;  ///< metres
 /// How sure an answer is: the chance of a joint to be within kNearby of where it is seen, by its
 /// uncertainty (metres); the mean over the 22 joints.
 double confidence(const std::array<double, kJoints>& uncertainty);
+/// The geometric mean of the joints' uncertainties, metres.
+double mean_uncertainty(const std::array<double, kJoints>& uncertainty);
 
 /// The radius around each joint within which the true joint should be nine times in ten, by the
 /// uncertainties (metres).

@@ -7,6 +7,7 @@
 
 #include "autograd/base/nearest.h"
 #include "autograd/base/shipped.h"
+#include "autograd/base/words.h"
 #include "nn/weights/state.h"
 
 namespace restage {
@@ -216,8 +217,7 @@ const TrainedModel* Bundle::find(const std::string& role) const {
 
 const TrainedModel& Bundle::need(const std::string& role, const std::string& where) const {
   if (const TrainedModel* found = find(role)) return *found;
-  std::string held;
-  for (const auto& entry : by_role_) held += (held.empty() ? "" : ", ") + entry.first;
+  const std::string held = joined(by_role_, [](const auto& entry) { return entry.first; });
   throw InputError(
       where,
       "holds no model for " + place_of(role) + (held.empty() ? "" : " (it holds " + held + ")"),

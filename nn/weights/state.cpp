@@ -4,8 +4,10 @@
 
 #include <algorithm>
 #include <map>
+#include <span>
 
 #include "autograd/base/atomic_file.h"
+#include "autograd/base/words.h"
 
 namespace restage {
 namespace {
@@ -32,10 +34,9 @@ std::string misfit(const Tensor& found, const Tensor& wanted) {
 void describe(std::string* text, const std::vector<std::string>& names, const char* what,
               size_t most) {
   if (names.empty()) return;
-  *text += (text->empty() ? "" : ", ") + std::to_string(names.size()) + " " + what + " (";
-  for (size_t i = 0; i < std::min(names.size(), most); ++i)
-    *text += (i > 0 ? ", " : "") + name_in_quotes(names[i]);
-  *text += names.size() > most ? ", ...)" : ")";
+  const std::span<const std::string> shown(names.data(), std::min(names.size(), most));
+  *text += cat(text->empty() ? "" : ", ", names.size(), " ", what, " (",
+               joined(shown, name_in_quotes), names.size() > most ? ", ...)" : ")");
 }
 
 /// Whether `pattern` matches all of `text`; the texts for its stars then.

@@ -7,9 +7,11 @@
 #include <atomic>
 #include <cstdlib>
 #include <set>
+#include <thread>
 
 #include "autograd/base/atomic_file.h"
 #include "autograd/base/inline_vector.h"
+#include "autograd/base/log.h"
 #include "autograd/base/output_check.h"
 #include "autograd/base/rng.h"
 #include "autograd/base/thread_groups.h"
@@ -141,6 +143,15 @@ TEST_F(AtomicFiles, ReadingHasLimits) {
   EXPECT_THROW(read_file(dir / "x", 4), InputError);
   EXPECT_THROW(read_file(dir / "missing"), InputError);
   EXPECT_THROW(read_file(dir.path()), InputError);
+}
+
+TEST(BaseSettingNames, AreWrittenAsWhoShowsTheMessageSays) {
+  EXPECT_EQ(spelled("give {max-memory}, or leave {up} out"), "give max_memory, or leave up out");
+  const std::string no_names = "a {, {} and {A} or {1: x}, {open";
+  EXPECT_EQ(spelled(no_names), no_names);
+  const InputError error("{up}.ply", "lies", "give {source-up}");
+  EXPECT_STREQ(error.what(), "{up}.ply: lies; give source_up") << "names of files stay";
+  EXPECT_EQ(error.mend(), "give source_up");
 }
 
 TEST(Checksums, SeeEverySingleByte) {
@@ -301,6 +312,37 @@ TEST(Errors, CarryTheirExitCodes) {
   EXPECT_EQ(WorkError("x").exit_code, 1);
   EXPECT_EQ(ShapeError("x").exit_code, 1);
   EXPECT_EQ(NonFiniteError("x").exit_code, 1);
+}
+
+using LogFiles = FileTest;
+
+TEST_F(LogFiles, MayBeChangedWhileOtherThreadsWrite) {
+  set_log_level(LogLevel::quiet);
+  std::atomic<bool> done = false;
+  std::vector<std::thread> writers;
+  for (int i = 0; i < 3; ++i)
+    writers.emplace_back([&] {
+      while (!done) log_info("a line");
+    });
+  for (int i = 0; i < 500; ++i) {
+    set_log_file(dir / (i % 2 == 0 ? "even" : "odd"));
+    std::this_thread::sleep_for(std::chrono::microseconds(300));
+  }
+  done = true;
+  for (std::thread& writer : writers) writer.join();
+  set_log_file(dir / "last");
+  log_info("to the last");
+  set_log_file("");
+  log_info("to none");
+  set_log_level(LogLevel::info);
+  size_t lines = 0;
+  for (const char* name : {"even", "odd"}) {
+    std::istringstream text(read_file(dir / name));
+    for (std::string line; std::getline(text, line); ++lines)
+      ASSERT_EQ(line.substr(19), " a line") << "after date and time";
+  }
+  EXPECT_GT(lines, 0u);
+  EXPECT_EQ(read_file(dir / "last").substr(19), " to the last\n");
 }
 
 /// Exit code of the script for a source tree, -1 if there is no Python.

@@ -7,11 +7,6 @@
 
 #include "autograd/gradcheck/evaluate.h"
 #include "autograd/gradcheck/gradcheck.h"
-#include "autograd/kernels/attention.h"
-#include "autograd/kernels/modulate.h"
-#include "autograd/kernels/points.h"
-#include "autograd/kernels/pooled_norm.h"
-#include "autograd/kernels/rnn.h"
 #include "autograd/ops/attention.h"
 #include "autograd/ops/elementwise.h"
 #include "autograd/ops/layout.h"
@@ -236,36 +231,6 @@ TEST(Device, TheGpusGruMakesItsProductsInParts) {
                                    0.25),
                      [](const auto& x) { return gru(x[0], x[1], x[2], x[3], x[4], x[5]); });
   }
-}
-
-/// Ops that have a kernel of their own and a composition, with the contracts of the former.
-TEST(Device, WithoutAFusedKernelAnOpIsComposed) {
-  const std::map<std::string, std::vector<std::type_index>> fused = {
-      {"neighbour_attention", {typeid(NeighbourAttentionArgs), typeid(NeighbourAttentionGradArgs)}},
-      {"attention_pool", {typeid(AttentionPoolArgs), typeid(AttentionPoolGradArgs)}},
-      {"pooled_norm", {typeid(PooledNormArgs), typeid(PooledNormGradArgs)}},
-      {"modulate", {typeid(ModulateArgs), typeid(ModulateGradArgs)}},
-      {"gru", {typeid(GruArgs), typeid(GruGradArgs)}}};
-  size_t found = 0;
-  for (const gradcheck::OpSamples& op : all_samples()) {
-    const auto contracts = fused.find(op.op);
-    if (contracts == fused.end()) continue;
-    ++found;
-    for (const std::type_index& missing : contracts->second) {
-      const WithoutKernels lacking({missing});
-      for (gradcheck::Sample s : op.samples) {
-        if (s.kind != gradcheck::Sample::Kind::smooth) continue;
-        const Tensor here = value_of(s, s.inputs);
-        s.device = fake_device();
-        const Tensor there = value_of(s, s.inputs);
-        ASSERT_EQ(here.shape(), there.shape()) << op.op << " " << s.title;
-        for (int64_t i = 0; i < here.numel(); ++i)
-          ASSERT_NEAR(here.item(i), there.item(i), 1e-9 * (1 + std::abs(here.item(i))))
-              << op.op << " " << s.title;
-      }
-    }
-  }
-  EXPECT_EQ(found, fused.size());
 }
 
 TEST(Device, AKernelThatItLacksIsNamed) {

@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "autograd/gradcheck/evaluate.h"
+#include "autograd/gradcheck/references.h"
 #include "autograd/kernels/stats.h"
 #include "autograd/ops/attention.h"
 #include "autograd/ops/elementwise.h"
@@ -24,9 +25,14 @@ namespace restage {
 namespace {
 
 using gradcheck::Args;
+using gradcheck::attention_pool_reference;
 using gradcheck::Build;
 using gradcheck::evaluate;
 using gradcheck::Evaluation;
+using gradcheck::gru_reference;
+using gradcheck::modulate_reference;
+using gradcheck::neighbour_attention_reference;
+using gradcheck::pooled_norm_reference;
 using gradcheck::random;
 using gradcheck::same_bits;
 using gradcheck::Sample;

@@ -1,9 +1,16 @@
-// Being asked to stop: by a host program, such as Python, that handles signals itself.
+// Being asked to stop: by a signal, and by a host program, such as Python, that handles signals
+// itself.
 #include "autograd/base/interrupt.h"
 
 #include <gtest/gtest.h>
+#include <signal.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
+#include <atomic>
 #include <thread>
+
+#include "tests/support/handled_signals.h"
 
 namespace restage {
 namespace {
@@ -52,7 +59,7 @@ TEST(Interrupt, AHostsWishIsForItsOwnCommandAndEndsWithIt) {
   EXPECT_FALSE(stop_requested());
 }
 
-TEST(Interrupt, ANewScopeForgetsTheLastOne) {
+TEST(Interrupt, WhatWasAskedOfAScopeEndsWithIt) {
   {
     const StopScope scope;
     ask_to_stop();
@@ -60,6 +67,51 @@ TEST(Interrupt, ANewScopeForgetsTheLastOne) {
   }
   const StopScope scope;
   EXPECT_FALSE(stop_requested());
+}
+
+TEST(Interrupt, ASignalIsForTheWholeProcessAndNotForOneScope) {
+  const test::HandledSignals handled;
+  {
+    const StopScope scope;
+    ::raise(SIGTERM);
+  }
+  EXPECT_TRUE(stop_requested()) << "between two scopes";
+  const StopScope next;
+  EXPECT_TRUE(stop_requested());
+  try {
+    throw_if_stopped();
+    FAIL() << "not stopped";
+  } catch (const Interrupted& stopped) {
+    EXPECT_EQ(stopped.exit_code, 143);
+  }
+  handle_signals();
+  EXPECT_FALSE(stop_requested()) << "a process that begins anew";
+}
+
+/// A process whose two threads get a signal at the same moment; its exit code.
+int after_two_signals_at_once() {
+  const pid_t child = ::fork();
+  if (child == 0) {
+    handle_signals();
+    const StopScope scope;
+    std::atomic<int> ready{0};
+    const auto get = [&ready] {
+      for (++ready; ready.load() < 2;) {
+      }
+      ::pthread_kill(::pthread_self(), SIGTERM);
+    };
+    std::thread other(get);
+    get();
+    other.join();
+    ::_exit(stop_requested() ? 0 : 1);
+  }
+  int status = 0;
+  ::waitpid(child, &status, 0);
+  return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+}
+
+TEST(Interrupt, TwoSignalsAtOnceAreOneRequest) {
+  for (int i = 0; i < 1000; ++i) ASSERT_EQ(after_two_signals_at_once(), 0) << i;
 }
 
 }  // namespace

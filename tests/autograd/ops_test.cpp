@@ -12,6 +12,8 @@
 #include "autograd/kernels/reduce.h"
 #include "autograd/ops/elementwise.h"
 #include "autograd/ops/linear.h"
+#include "autograd/ops/modulate.h"
+#include "autograd/ops/norm.h"
 #include "autograd/ops/points.h"
 #include "autograd/ops/reduce.h"
 #include "autograd/ops/rnn.h"
@@ -282,6 +284,28 @@ TEST(Threads, ShareAFewLongRows) {
             }),
             many)
       << "its gradient";
+}
+
+TEST(Threads, ShareTheItemsOfInstanceNorm) {
+  const Tensor x = random({2, 2000, 256}, 1).cast(DType::f32);
+  Tape tape;
+  Var y;
+  EXPECT_GE(pieces_of([&] { y = instance_norm(tape.leaf(x, 1)); }), 16);
+  EXPECT_GE(pieces_of([&] { tape.backward(y, x); }), 16);
+}
+
+TEST(Threads, ShareTheSumsOfModulatesGradient) {
+  // Parts of 128 points, 24 an item: their sums are added up by several threads, too.
+  const int64_t n = 2, v = 3072, c = 512;
+  for (const int64_t rows : {v, int64_t{1}}) {
+    const Tensor x = Tensor::full({n, rows, c}, 0.5), mesh = Tensor::full({n, v, 3}, 0.5),
+                 w = Tensor::full({c, 3}, 1), b = Tensor::full({c}, 1),
+                 g = Tensor::full({n, v, c}, 1);
+    Tape tape;
+    const Var y = modulate(tape.leaf(x, 1), Var(mesh), tape.leaf(w, 2), tape.leaf(b, 3), Var(w),
+                           Var(b), Activation::none);
+    EXPECT_GE(pieces_of([&] { tape.backward(y, g); }), 2 * 24 + 8);
+  }
 }
 
 TEST(Threads, SumsAreAccurate) {

@@ -90,6 +90,81 @@ TEST(Tape, AccumulationDoesNotChangeASharedGradient) {
   EXPECT_DOUBLE_EQ(g.find(2)->item(), 1);
 }
 
+TEST(Tape, ASliceAddsToItsPartAlone) {
+  Tape tape;
+  const Var x = tape.leaf(values({1, 2, 3}), 1), y = tape.leaf(values({4, 5, 6}), 2);
+  const Var middle = slice(x, 0, 1, 2), last = slice(x, 0, 1, 3);
+  const Var both = x + y;  // comes first on the way back: x and y share one gradient
+  const Gradients g = tape.backward(sum_all(concat({both, middle, middle * last}, 0)));
+  EXPECT_EQ(g.find(1)->to_vector<double>(), (std::vector<double>{1, 1 + 1 + 2 + 5, 1 + 2}));
+  EXPECT_EQ(g.find(2)->to_vector<double>(), (std::vector<double>{1, 1, 1}));
+}
+
+TEST(Tape, AnOpMayHaveSeveralResults) {
+  Tape tape;
+  const Var x = tape.leaf(values({1, 2, 3, 4, 5, 6}), 1);
+  const Vars parts = split(x, 0, {1, 2, 3});
+  ASSERT_EQ(parts.size(), 3u);
+  EXPECT_EQ(parts[1].value.to_vector<double>(), (std::vector<double>{2, 3}));
+  ASSERT_EQ(tape.size(), 4u);
+  EXPECT_STREQ(tape.name(1), "split");
+  EXPECT_STREQ(tape.name(3), "another result");
+  EXPECT_EQ(tape.saved(3), nullptr);
+  tape.keep_gradient(parts[1]);
+  tape.keep_gradient(parts[2]);
+  const Gradients g = tape.backward(sum_all(square(parts[2])) + sum_all(parts[0]));
+  EXPECT_EQ(g.size(), 1u);
+  EXPECT_EQ(g.find(1)->to_vector<double>(), (std::vector<double>{1, 0, 0, 8, 10, 12}));
+  EXPECT_EQ(g.find(parts[2])->to_vector<double>(), (std::vector<double>{8, 10, 12}));
+  EXPECT_EQ(g.find(parts[1]), nullptr) << "the loss does not depend on it";
+  const Vars constants = split(x.detach(), 0, {3, 3});
+  EXPECT_FALSE(constants[1].on_tape());
+}
+
+/// Bytes that f takes beside what was there before.
+template <class F>
+int64_t room_of(const F& f) {
+  reset_peak_memory();
+  const int64_t before = memory_stats().in_use;
+  f();
+  return memory_stats().peak - before;
+}
+
+constexpr int64_t kLong = 1 << 18, kBytes = 8 * kLong;
+
+TEST(Tape, AddsUpInPlaceWhatNobodyShares) {
+  const Tensor one = Tensor::full({kLong}, 1, DType::f64);
+  Tape tape;
+  const Var x = tape.leaf(one, 1);
+  const Var y = scale(x, 2) + scale(x, 3) + scale(x, 4);
+  Gradients g;
+  EXPECT_LT(room_of([&] { g = tape.backward(y, one); }), 5 * kBytes / 2) << "the sum and one more";
+  EXPECT_EQ(g.find(1)->item(kLong / 2), 9);
+  EXPECT_EQ(one.item(), 1) << "the gradient that was given is the caller's";
+}
+
+TEST(Tape, TheGradientOfASplitIsOneConcatenation) {
+  const Tensor one = Tensor::full({kLong}, 1, DType::f64);
+  Tape tape;
+  const Vars parts = split(tape.leaf(one, 1), 0, {kLong / 4, kLong / 2, kLong / 4});
+  const Var y = concat({parts[2], parts[1], parts[0]}, 0);
+  EXPECT_LT(room_of([&] { tape.backward(y, one); }), 5 * kBytes / 2) << "the parts and the whole";
+}
+
+TEST(Tape, SlicesNeedNoRoomOfTheWhole) {
+  const int64_t parts = 64;
+  const Tensor one = Tensor::full({parts, kLong / parts}, 1, DType::f64);
+  Tape tape;
+  const Var x = tape.leaf(one, 1);
+  std::vector<Var> slices;
+  for (int64_t i = 0; i < parts; ++i) slices.push_back(scale(slice(x, 0, i, i + 1), 2));
+  const Var y = concat(std::span<const Var>(slices), 0);
+  Gradients g;
+  EXPECT_LT(room_of([&] { g = tape.backward(y, one); }), 5 * kBytes / 2)
+      << "the gradients of all slices, and the sum";
+  for (int64_t i = 0; i < kLong; i += kLong / parts) EXPECT_EQ(g.find(1)->item(i), 2);
+}
+
 TEST(Tape, TwoPlayersDoNotMix) {
   // The discriminator's step sees the generator's output as a constant.
   const Tensor generator = values({2}), discriminator = values({3});
@@ -234,6 +309,12 @@ TEST(FiniteChecks, NameTheOpAndModuleOfTheForwardPass) {
   const FiniteCheck check;
   const ModuleScope outer("deformation"), inner("fc2");
   expect_error<NonFiniteError>([&] { log(x); }, {"forward", "'log'", "deformation.fc2"});
+}
+
+TEST(FiniteChecks, LookAtAllResultsOfAnOp) {
+  const FiniteCheck check;
+  const Var x(values({1, 2, std::numeric_limits<double>::infinity()}));
+  expect_error<NonFiniteError>([&] { split(x, 0, {2, 1}); }, {"forward", "'split'"});
 }
 
 TEST(FiniteChecks, NameTheOpAndModuleOfTheBackwardPass) {

@@ -1,12 +1,12 @@
 // Writes small files as users hold them, in the styles that the importers' tests have, into a
 // folder:
 //   make_samples FOLDER
-// docs/notes/import_transcripts.md shows what `restage data import` says of them.
+// tests/cli/test_import.py imports each of them.
 #include <filesystem>
 #include <iostream>
 
 #include "autograd/base/atomic_file.h"
-#include "datasets/readers/mesh_io.h"
+#include "datasets/readers/clouds/mesh_io.h"
 #include "tests/datasets/gltf_maker.h"
 #include "tests/datasets/importers_bvh_text.h"
 #include "tests/datasets/smpl_support.h"

@@ -40,8 +40,11 @@ class CliTest(unittest.TestCase):
     # ---- running ----
 
     def restage(self, *arguments, stdout=subprocess.PIPE, before=None, timeout=120):
-        return Result(subprocess.run([PROGRAM, *map(str, arguments)], cwd=self.folder, stdout=stdout, stderr=subprocess.PIPE,
-                                     text=True, timeout=timeout, preexec_fn=before, errors="replace"))
+        result = Result(subprocess.run([PROGRAM, *map(str, arguments)], cwd=self.folder, stdout=stdout, stderr=subprocess.PIPE,
+                                       text=True, timeout=timeout, preexec_fn=before, errors="replace"))
+        # The library writes {fps} for a setting; the program has to say how that is written on a command line.
+        self.assertNotRegex(result.err + (result.out or ""), r"(?<!\w)\{[a-z][a-z-]*\}", arguments)
+        return result
 
     def start(self, *arguments):
         """The command in the background, which ends with the test."""

@@ -11,7 +11,7 @@ WEIGHTS = os.path.join(ROOT, "experiments", "weights", "lite.safetensors")
 class Adapt(CliTest):
     def test_learns_or_writes_nothing(self):
         self.person(frames=60)
-        call = ["adapt", "--source", "walk/source.h5", "--weights", WEIGHTS, "--steps", "12", "--views", "4"]
+        call = ["adapt", "--source", "walk/source.h5", "--weights", WEIGHTS, "--steps", "12", "--samples", "4"]
         gained = self.restage(*call, "--out", "a.safetensors", "--json")
         again = self.restage(*call, "--out", "b.safetensors", "--json", "--threads", "1")
         self.assertEqual((gained.code, gained.out.replace("a.safe", "b.safe")), (again.code, again.out))
@@ -36,7 +36,7 @@ class Adapt(CliTest):
         for name in names[40:]:  # the whole held-out part, and a little more
             with open(self.path("frames/" + name), "w") as f:
                 f.write("ply\n")
-        call = ["adapt", "--weights", WEIGHTS, "--steps", "80", "--batch", "8", "--views", "4", "--json", "--out", "w.safetensors"]
+        call = ["adapt", "--weights", WEIGHTS, "--steps", "80", "--batch", "8", "--samples", "4", "--json", "--out", "w.safetensors"]
         result = self.restage(*call, "--source", "frames/", "--source", "walk/source.h5")
         self.assertEqual(result.code, 0, result.err)
         self.assertEqual(json.loads(result.out)["frames"], {"taught": 85, "held_out": 30, "left_out": 5})
@@ -53,7 +53,7 @@ class Adapt(CliTest):
         call = ["adapt", "--source", "walk/source.h5", "--weights", WEIGHTS]
         self.bad_input([*call, "--out", "w.safetensors"], "walk/source.h5", "too few")
         self.bad_input([*call, "--out", "w.h5"], "w.h5", ".safetensors")
-        for option, value in (("--steps", "0"), ("--rate", "nan"), ("--views", "0"), ("--held-out", "1"), ("--batch", "0")):
+        for option, value in (("--steps", "0"), ("--rate", "nan"), ("--samples", "0"), ("--held-out", "1"), ("--batch", "0")):
             self.bad_input([*call, "--out", "w.safetensors", option, value], option)
         self.bad_input(["adapt", "--source", "walk/source.h5", "--source", "none/", "--weights", WEIGHTS, "--out", "w.safetensors"], "none")
         self.bad_input(["adapt", "--source", "walk/source.h5", "--scale", "0.001", "--weights", WEIGHTS, "--out", "w.safetensors"], "walk/source.h5")

@@ -164,7 +164,7 @@ class Arrays(CliTest):
         self.write("walk.npz", npz(points=cloud(2)))
         self.write("walk.npy", cloud(2))
         for name in ("walk.npz", "walk.npy"):
-            found = self.json("skeleton", "--weights", weights("tiny"), "--input", name)
+            found = self.json("skeleton", "--weights", weights("tiny"), "--source", name)
             self.assertEqual([f["source"] for f in found["frames"]], [name + ":0", name + ":1"])
 
     def test_memory_limit(self):

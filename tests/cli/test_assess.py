@@ -43,6 +43,20 @@ class Assess(CliTest):
             self.assertIn(said, page)
         self.bad_input(["assess", "walk/frames/", "--weights", WEIGHTS, "--out", "page.png"], "page.png", ".html")
 
+    def test_frames_left_out_are_no_jitter(self):
+        """Where frames are missing the person has gone on: what stands before and behind does not follow each other."""
+        self.person(frames=60)
+        self.done("retarget", "--source", "walk/source.h5", "--target", "walk/target.ply", "--weights", WEIGHTS, "--out", "frames/")
+        names = sorted(os.listdir(self.path("frames")))
+        whole = self.json("assess", "frames/", "--weights", WEIGHTS, "--samples", 1)
+        for k in (18, 19, 20, 21, 22, 38, 39, 40, 41, 42):
+            self.ply(os.path.join("frames", names[k]), [])
+        found = self.json("assess", "frames/", "--weights", WEIGHTS, "--samples", 1)
+        self.assertEqual((found["frames"], found["left_out"]), (50, 10))
+        self.assertLess(found["jitter_mm"], 1.25 * whole["jitter_mm"])
+        for frame in found["shakiest_frames"]:
+            self.assertNotIn(frame, (15, 16, 17, 23, 24, 25, 35, 36, 37, 43, 44, 45), "beside a gap nothing is measured")
+
     def test_bad_input(self):
         self.write("empty/readme.txt", "nothing")
         self.bad_input(["assess", "empty/", "--weights", WEIGHTS], "empty")

@@ -220,12 +220,12 @@ class FetchData(CliTest):
         self.assertEqual(self.bytes("data/body/x"), b"content")
         found = self.json("data", "fetch", "list.txt", "--out", "data")
         self.assertEqual((found["fetched"], found["present"], found["missing"]), (0, 1, []))
-        self.done("data", "fetch", "list.txt", "--out", "copy", "--from", "data")
+        self.done("data", "fetch", "list.txt", "--out", "copy", "--source", "data")
         self.assertEqual(self.bytes("copy/body/x"), b"content")
 
     def test_failures_say_what_to_do(self):
         self.write("list.txt", self.listed(b"x", "a", "https://localhost:1/a"))
-        self.one_line(self.restage("data", "fetch", "list.txt", "--out", "data", "--quiet"), 1, "localhost", "--from FOLDER")
+        self.one_line(self.restage("data", "fetch", "list.txt", "--out", "data", "--quiet"), 1, "localhost", "--source FOLDER")
         self.write("list.txt", self.listed(b"x", "a", "-"))
         result = self.restage("data", "fetch", "list.txt", "--out", "data", "--quiet")
         self.assertEqual((result.code, result.err), (1, ""))
@@ -234,7 +234,7 @@ class FetchData(CliTest):
         self.bad_input(["data", "fetch", "list.txt", "--out", "other"], "list.txt:1")
         self.bad_input(["data", "fetch", "none.txt", "--out", "other"], "none.txt")
         self.write("list.txt", self.listed(b"x", "a", "-"))
-        self.bad_input(["data", "fetch", "list.txt", "--out", "other", "--from", "nowhere"], "nowhere")
+        self.bad_input(["data", "fetch", "list.txt", "--out", "other", "--source", "nowhere"], "nowhere")
 
     def test_what_is_wrong_is_told_before_anything_is_fetched(self):
         good = self.listed(b"x", "a", "-")
@@ -248,7 +248,7 @@ class FetchData(CliTest):
             self.write("clips.txt", "@one https://localhost:1/tree https://localhost:1/files\n" + "0" * 64 +
                        " 01_01a 01_01.bvh - 4 0 40 0 01 train walk\n")
             self.write("list.txt", good + wrong)
-            self.bad_input(["data", "fetch", "list.txt", "--out", "data", "--from", "copy"])
+            self.bad_input(["data", "fetch", "list.txt", "--out", "data", "--source", "copy"])
         self.bad_input(["data", "fetch", "--out", "data"], "open_data.txt", "LIST")
 
     @needs_data("body/targets_original.tar.xz")
@@ -260,7 +260,7 @@ class FetchData(CliTest):
             with gzip.open(os.path.join(DATA, "body", name + ".gz")) as packed:
                 self.write("originals/body/makehuman/" + os.path.basename(name), packed.read())
         listed = os.path.join(ROOT, "configs", "data", "open_data.txt")
-        result = self.restage("data", "fetch", listed, "--out", "data", "--from", "originals")
+        result = self.restage("data", "fetch", listed, "--out", "data", "--source", "originals")
         self.assertEqual(result.code, 1)  # motions and garments are not there
         self.assertNotIn("missing body/makehuman.h5", result.out)
         os.makedirs(self.path("copy/body"))
@@ -274,6 +274,6 @@ class FetchData(CliTest):
 
     @needs_data("body/makehuman.h5")
     def test_the_projects_list_and_a_copy(self):
-        found = self.json("data", "fetch", os.path.join(ROOT, "configs", "data", "open_data.txt"), "--out", "data", "--from", DATA)
+        found = self.json("data", "fetch", os.path.join(ROOT, "configs", "data", "open_data.txt"), "--out", "data", "--source", DATA)
         self.assertEqual(found["missing"], [])
         self.assertTrue(os.path.exists(self.path("data/cmu/clips30.h5")))

@@ -110,7 +110,7 @@ class Data(CliTest):
         self.bad_input(call + ["--facing", "y", "--up=-y"], "--facing lies along --up")
         self.bad_input(call + ["--split", "nope"], "--split 'nope'", "validation")
         self.bad_input(call + ["--asf", "none.asf"], "--asf")
-        self.bad_input(["data", "import", "", "--out", "x.h5"], "SOURCE is empty")
+        self.bad_input(["data", "import", "", "--out", "x.h5"], "--source is empty")
 
     def test_import_with_a_profile(self):
         suit = toy_bvh()
@@ -155,6 +155,13 @@ class Data(CliTest):
         self.bad_input(["data", "build", "--out", "x.h5", "--bodies", -1, 0, 0], "--bodies")
         self.bad_input(["data", "build", "--out", "nowhere/x.h5", "--bodies", 1, 0, 0], "nowhere")
         self.bad_input(["data", "import", "nothing", "--out", "x.h5"], "nothing")
+
+    def test_no_more_frames_are_performed_than_a_motion_has(self):
+        self.done("data", "build", "--bodies", 1, 0, 0, "--motions", 1, 0, 0, "--quiet", "--out", "data.h5")
+        call = ["data", "perform", "--bodies", "data.h5", "--out", "walk"]
+        self.bad_input([*call, "--frames", 99999], "frames", "--first and --frames")
+        self.bad_input([*call, "--first", 1, "--frames", 99999], "frames", "--first and --frames")
+        self.assertFalse(os.path.exists(self.path("walk")))
 
     def test_full_disk(self):
         result = self.restage("data", "build", "--bodies", 1, 0, 0, "--motions", 0, 0, 0, "--quiet", "--out", "x.h5", before=small_disk)

@@ -5,8 +5,9 @@ import os
 import struct
 import zlib
 
-from support import CliTest, numbers
+from support import ROOT, CliTest, numbers
 from test_arrays import npy
+from test_data import toy_bvh
 from test_gltf import character
 
 
@@ -63,7 +64,7 @@ class DoctorFix(CliTest):
             self.assertEqual(self.restage("doctor", name).code, 0)
             self.assertTrue(self.fix(name, out, 0)["fixed"]["usable"], name)
         # A target that lacks a point would be another: retarget refuses it, and so does the doctor.
-        self.assertEqual(self.restage("doctor", "bad.ply", "--target").code, 1)
+        self.assertEqual(self.restage("doctor", "bad.ply", "--as-target").code, 1)
         self.assertEqual(self.mesh("b.ply"), (person, faces))
         self.assertEqual(json.loads(self.done("doctor", "e.h5", "--json"))["facts"]["frames"], 2)
 
@@ -88,7 +89,7 @@ class DoctorFix(CliTest):
 
     def test_json_says_what_was_written(self):
         self.ply("back.ply", [(-x, y, -z) for x, y, z in self.person()])
-        found = self.fix("back.ply", "mended.ply", 0, "--target", "--picture", "p.png")
+        found = self.fix("back.ply", "mended.ply", 0, "--as-target", "--picture", "p.png")
         self.assertEqual((found["picture"], found["usable"]), ("p.png", False))
         fixed = found["fixed"]
         self.assertEqual((fixed["file"], fixed["transform_file"], fixed["usable"], fixed["still_wrong"]),
@@ -98,9 +99,9 @@ class DoctorFix(CliTest):
 
     def test_what_is_still_wrong_is_said(self):
         arms = [(x, y - abs(x), z) for x, y, z in self.person()]  # hanging arms stay what they are
-        found = self.fix(self.ply("arms.ply", arms), "arms2.ply", 1, "--target")
+        found = self.fix(self.ply("arms.ply", arms), "arms2.ply", 1, "--as-target")
         self.assertIn("T-pose", found["fixed"]["still_wrong"][0]["what"])
-        text = self.restage("doctor", "arms.ply", "--fix", "arms2.ply", "--target")
+        text = self.restage("doctor", "arms.ply", "--fix", "arms2.ply", "--as-target")
         self.assertEqual(text.code, 1)
         self.assertIn("wrote arms2.ply, still not usable:", text.out)
 
@@ -213,12 +214,32 @@ class DoctorFix(CliTest):
         self.write("none.glb", b"")
         self.bad_input(["doctor", "none.glb"], "none.glb: is empty")
 
+    def test_an_option_that_says_nothing_is_refused(self):
+        self.write("a.bvh", toy_bvh())
+        self.write("a.yaml", "seed: 1\n")
+        self.done("data", "import", "a.bvh", "--out", "motions.h5")
+        lite = os.path.join(ROOT, "experiments", "weights", "lite.safetensors")
+        for file in ("a.yaml", lite, "motions.h5"):
+            for option in (["--scale", "mm"], ["--up", "z"], ["--facing", "x"], ["--fps", 60], ["--bones", "mixamo"], ["--as-target"]):
+                self.bad_input(["doctor", file, *option], os.path.basename(file), "leave " + option[0] + " out")
+        self.bad_input(["doctor", "a.bvh", "--as-target"], "a.bvh", "leave --as-target out")
+        self.frames("walking", self.walk())
+        self.bad_input(["doctor", "walking", "--as-target"], "walking", "leave --as-target out")
+
+    def test_the_unit_of_a_recording_is_told(self):
+        self.write("a.bvh", toy_bvh())  # centimetres
+        facts = lambda *more: self.json("doctor", "a.bvh", *more)["facts"]  # noqa: E731
+        self.assertEqual(facts()["metres_per_unit"], 0.01)
+        self.assertEqual(facts("--scale", "0.012")["metres_per_unit"], 0.012)
+        self.assertAlmostEqual(facts("--scale", "0.012")["leg_length"], 1.2 * facts()["leg_length"], delta=1e-6)
+        self.assertNotEqual(facts("--up", "y", "--facing", "x"), facts())
+
     def test_people_are_turned_by_the_angle_found(self):
         turn = math.radians(35)
         person = [(x * math.cos(turn) + z * math.sin(turn), y, z * math.cos(turn) - x * math.sin(turn)) for x, y, z in self.person()]
         self.ply("turned.ply", person)
-        self.assertEqual(self.restage("doctor", "turned.ply", "--target").code, 1)
-        found = self.fix("turned.ply", "straight.ply", 0, "--target")
+        self.assertEqual(self.restage("doctor", "turned.ply", "--as-target").code, 1)
+        found = self.fix("turned.ply", "straight.ply", 0, "--as-target")
         self.assertAlmostEqual(found["frame"]["turned"], 35, delta=8)
         self.assertIn("turned by", " ".join(found["fixed"]["remarks"]))
         kept = json.loads(self.bytes("straight.ply.transform.json"))

@@ -1,4 +1,4 @@
-"""FBX as target and as source (datasets/readers/fbx.h): files made here as text by FBX's own formula, real ones where they are at hand,
+"""FBX as target and as source (datasets/readers/fbx/fbx.h): files made here as text by FBX's own formula, real ones where they are at hand,
 and the way to FBX through Blender."""
 import base64
 import json
@@ -190,7 +190,7 @@ class Fbx(CliTest):
     def test_all_commands_read_it(self):
         self.person("hero.fbx", self.walk())
         self.assertEqual(self.json("data", "import", "hero.fbx", "--out", "hero.h5")["bodies"], 1)
-        self.done("doctor", "hero.fbx", "--target")
+        self.done("doctor", "hero.fbx", "--as-target")
         self.done("data", "inspect", "hero.fbx")
         self.done("retarget", "--source", "hero.fbx", "--target", "hero.fbx", "--out", "hero.bvh")
 

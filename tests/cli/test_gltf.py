@@ -104,7 +104,7 @@ class Gltf(CliTest):
         self.assertEqual(found.code, 0, found.err)
         self.assertIn("A-pose turned into T-pose", found.err)  # brought into the T-pose by its rig
         self.bad_input(call + ["--bones", "none.yaml"], "none.yaml")
-        doctor = ["doctor", "own.glb", "--target", "--json"]
+        doctor = ["doctor", "own.glb", "--as-target", "--json"]
         self.assertIn("not recognised", self.restage(*doctor).out)
         named = json.loads(self.restage(*doctor, "--bones", "own.YML").out)
         self.assertNotIn("not recognised", str(named))
@@ -156,7 +156,7 @@ class Gltf(CliTest):
 
     def test_a_rig_decides_for_doctor_and_retarget(self):
         # 22 specks that look like nobody: the rig says who stands there, and that in T-pose.
-        result = self.restage("doctor", "hero.glb", "--target", "--json")
+        result = self.restage("doctor", "hero.glb", "--as-target", "--json")
         found = json.loads(result.out)
         said = {f["topic"]: (f["weight"], f["evidence"]) for f in found["findings"]}
         self.assertEqual(said["up"], ("fact", "the rig's joints"))
@@ -166,14 +166,14 @@ class Gltf(CliTest):
         # The same of names that nobody knows: never turned over.
         names = ["bone %d" % j for j in range(22)]
         character(self.path("own.glb"), names)
-        found = json.loads(self.restage("doctor", "own.glb", "--target", "--json").out)
+        found = json.loads(self.restage("doctor", "own.glb", "--as-target", "--json").out)
         self.assertEqual([f["weight"] != "wrong" and f["what"].startswith("+y is up") for f in found["findings"] if f["topic"] == "up"], [True])
         # retarget asks the same: no weights here, so that nothing but the target is judged.
         w = weights("tposes", *TPOSES)
         self.done("data", "build", "--bodies", 1, 0, 1, "--motions", 1, 0, 0, "--quiet", "--out", "data.h5")
         self.done("data", "perform", "--bodies", "data.h5", "--frames", 12, "--quiet", "--out", "walk")
         call = ["retarget", "--weights", w, "--source", "walk/source.h5", "--out", "x.h5", "--target"]
-        doctor = self.restage("doctor", "hero.glb", "--target").code
+        doctor = self.restage("doctor", "hero.glb", "--as-target").code
         self.assertEqual(self.restage(*call, "hero.glb").code, 0 if doctor == 0 else 2)
 
     def test_mirrored_rigs_are_named(self):

@@ -1,14 +1,13 @@
 """restage data import: what is found in recordings is told, what does not fit is refused, nothing is ignored."""
 import os
 import re
+import subprocess
 
-import import_transcripts
-from support import CliTest, PROGRAM
+from support import CliTest, DATA, needs_data
 from test_data import JOINTS, NAMES, toy_bvh
 
 RESTS = " 0" * 66
 SAMPLES = os.path.join(os.path.dirname(os.environ["RESTAGE_MAKE_H5"]), "make_samples")
-PAGE = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", "docs", "notes", "import_transcripts.md")
 
 
 def frames(motion, seconds="0.0333333"):
@@ -201,19 +200,30 @@ class Import(CliTest):
         self.assertIn("--scale 0.1", found["reports"][0]["remarks"][0])
 
 
-class Transcripts(CliTest):
-    """The commands of docs/notes/import_transcripts.md, as far as their files are made here."""
+class Samples(CliTest):
+    """Each importer reads a file of its kind: the words of the command."""
 
-    def test_every_importer_reads_its_sample(self):
-        import_transcripts.prepare(self.folder, SAMPLES)
-        with open(PAGE, encoding="utf-8") as f:
-            page = f.read()
-        for _, _, command in import_transcripts.CASES:
-            with self.subTest(command=command):
-                self.assertIn("\n$ " + command + "\n", page, "renew docs/notes/import_transcripts.md (import_transcripts.py)")
-                if "samples/" in command:
-                    code, text = import_transcripts.run(PROGRAM, self.folder, command)
-                    self.assertEqual(code, 0, text)
-                    self.assertIn("\nwrote ", text)
-                    self.assertNotIn("skipped", text)
-                    self.assertEqual(self.json("data", "verify", command.split()[-1])["problems"], [])
+    MADE = (  # by make_samples, in the style of a data set
+        "mixamo.bvh", "lafan1.bvh", "100style.bvh", "soma.bvh", "AMASS --body-model samples/models --license AMASS",
+        "models/SMPLX_NEUTRAL.npz --betas zeros samples/AMASS/ben/shape.npz", "mixamo.glb --license CC0-1.0", "unreal.glb", "hero.vrm",
+        "4D-DRESS", "CAPE --fps 60", "walk.npy --fps 25")
+    REAL = ("cmu/bvh/02_01.bvh.xz", "cmu/bvh_original_skeleton/01_01.bvh.xz", "foreign/makehuman_walk1.bvh.xz",
+            "foreign/makehuman_benchmark.bvh.xz", "foreign/pymo_walk_meredith.bvh.xz", "cmu/asfamc/02_01.amc.xz --subject 02")
+
+    def imports(self, words):
+        with self.subTest(words=words):
+            said = self.done("data", "import", *words.split(), "--out", "x.h5")
+            self.assertIn("\nwrote x.h5", said)
+            self.assertNotIn("skipped", said)
+            self.assertEqual(self.json("data", "verify", "x.h5")["problems"], [])
+
+    def test_small_files_in_the_style_of_a_data_set(self):
+        subprocess.run([SAMPLES, self.path("samples")], check=True)
+        for words in self.MADE:
+            self.imports("samples/" + words)
+
+    @needs_data("cmu/bvh/02_01.bvh.xz")
+    def test_real_recordings(self):
+        for words in self.REAL:
+            self.imports(os.path.join(DATA, words))
+        self.bad_input(["data", "import", os.path.join(DATA, "foreign/fairmotion_sinusoidal.bvh.xz"), "--out", "chain.h5"], "none of its 4 bones")

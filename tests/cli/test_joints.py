@@ -21,21 +21,21 @@ class LookAhead(CliTest):
         self.assertGreater(apart, 1e-4)
         self.assertLess(apart, 0.05)
         # The same network alone, as the file's only one.
-        self.done("weights", "export", "--from", STANDARD, "--model", "motion.late", "--out", "m.safetensors")
-        self.done("weights", "import", "--from", "m.safetensors", "--model", "smrm/hybrid", "--with", STANDARD, "--out", "one.safetensors")
+        self.done("weights", "export", "--source", STANDARD, "--model", "motion.late", "--out", "m.safetensors")
+        self.done("weights", "import", "--source", "m.safetensors", "--model", "smrm/hybrid", "--with", STANDARD, "--out", "one.safetensors")
         self.done(*make, "--weights", "one.safetensors", "--online", "--out", "one.h5")
         self.assertEqual(self.json("eval", "--pred", "one.h5", "--truth", "late.h5")["mean"]["mpjpe"], 0)
-        self.done("weights", "import", "--from", "m.safetensors", "--model", "smrm/hybrid", "--role", "motion.late", "--with", STANDARD,
+        self.done("weights", "import", "--source", "m.safetensors", "--model", "smrm/hybrid", "--role", "motion.late", "--with", STANDARD,
                   "--out", "both.safetensors")
         self.done(*make, "--weights", "both.safetensors", "--out", "both.h5")
         self.assertEqual(self.json("eval", "--pred", "both.h5", "--truth", "late.h5")["mean"]["mpjpe"], 0)
         for role in ("skeleton", "late", "motion.later"):
-            self.bad_input(["weights", "import", "--from", "m.safetensors", "--model", "smrm/hybrid", "--role", role, "--out", "w.safetensors"],
+            self.bad_input(["weights", "import", "--source", "m.safetensors", "--model", "smrm/hybrid", "--role", role, "--out", "w.safetensors"],
                            role)
 
-        self.bad_input(["weights", "export", "--from", STANDARD, "--model", "smrm/hybrid", "--out", "w.safetensors"], "two models")
-        self.done("weights", "export", "--from", STANDARD, "--model", "motion", "--out", "now.safetensors")
-        self.bad_input(["weights", "import", "--from", "now.safetensors", "--model", "smrm/hybrid", "--role", "motion.late",
+        self.bad_input(["weights", "export", "--source", STANDARD, "--model", "smrm/hybrid", "--out", "w.safetensors"], "two models")
+        self.done("weights", "export", "--source", STANDARD, "--model", "motion", "--out", "now.safetensors")
+        self.bad_input(["weights", "import", "--source", "now.safetensors", "--model", "smrm/hybrid", "--role", "motion.late",
                         "--out", "w.safetensors"], "now.safetensors", "look ahead")
 
     def test_networks_of_two_definitions_are_refused(self):
@@ -91,7 +91,7 @@ class Joints(CliTest):
         self.person()
         self.assertEqual(self.json("data", "inspect", "data.h5")["joint_definition"], {"builtin": 2})
         self.assertIn("builtin", self.done("data", "inspect", "walk/truth.h5"))
-        self.done("skeleton", "--weights", STANDARD, "--input", "walk/source.h5", "--out", "own.h5")
+        self.done("skeleton", "--weights", STANDARD, "--source", "walk/source.h5", "--out", "own.h5")
         self.assertEqual(self.json("data", "inspect", "own.h5")["joint_definition"], {"makehuman": 1})
         result = self.restage("eval", "--pred", "own.h5", "--truth", "walk/truth.h5", "--json")
         self.assertEqual(result.code, 0, result.err)
@@ -100,7 +100,7 @@ class Joints(CliTest):
 
     def test_skeleton_and_retarget_convert(self):
         self.person()
-        call = ["skeleton", "--weights", STANDARD, "--input", "walk/target.ply"]
+        call = ["skeleton", "--weights", STANDARD, "--source", "walk/target.ply"]
         own, smpl = (self.json(*call, *more)["frames"][0]["joints"] for more in ([], ["--joints", "smpl"]))
         self.assertEqual(self.json(*call, "--joints", "makehuman")["frames"][0]["joints"], own)
         hips = [abs(j[1][0] - j[2][0]) for j in (own, smpl)]

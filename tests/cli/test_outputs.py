@@ -65,7 +65,7 @@ class InputsStay(CliTest):
         self.stays("frames/frame_000000.ply", *retarget, "frames", "--target", "hero.ply", "--out", "frames/")
         self.stays("frames/frame_000000.ply", *retarget, "hero.ply", "--target", "frames/frame_000000.ply", "--out", "frames")
         self.stays("w.h5", *retarget, "frames", "--target", "hero.ply", "--out", "w.h5")
-        self.stays("frames/frame_000001.ply", "skeleton", "--weights", w, "--input", "frames", "--out", "frames/frame_000001.ply")
+        self.stays("frames/frame_000001.ply", "skeleton", "--weights", w, "--source", "frames", "--out", "frames/frame_000001.ply")
         self.h5("rest.h5", joints=([1, 22, 3], [0.0]))
         self.stays("rest.h5", "retarget", "--system", "register", "--source", "frames", "--target", "hero.ply", "--rest", "rest.h5", "--out", "rest.h5")
         self.done("doctor", "frames", "--fix", "scans.h5", "--up", "y", "--scale", "0.3")
@@ -86,9 +86,9 @@ class InputsStay(CliTest):
     def test_weights(self):
         self.write("o.safetensors", tensors(OFFSETS))
         model = ("--model", "deformation/offsets", "--out")
-        self.stays("o.safetensors", "weights", "import", "--from", "o.safetensors", *model, "o.safetensors")
-        self.done("weights", "import", "--from", "o.safetensors", *model, "w.safetensors")
-        self.stays("w.safetensors", "weights", "export", "--from", "w.safetensors", *model, "w.safetensors")
+        self.stays("o.safetensors", "weights", "import", "--source", "o.safetensors", *model, "o.safetensors")
+        self.done("weights", "import", "--source", "o.safetensors", *model, "w.safetensors")
+        self.stays("w.safetensors", "weights", "export", "--source", "w.safetensors", *model, "w.safetensors")
 
 
 class Places(CliTest):
@@ -151,7 +151,7 @@ class Places(CliTest):
                 self.bad_input(["data", "import", name, "--out", "x.h5"], name)
         self.bad_input(["eval", "--pred", "a.h5", "--truth", "a.h5"], "a.h5")
         self.bad_input(["data", "import", "walk.bvh", "--bones", "a.yaml", "--out", "x.h5"], "a.yaml")
-        self.bad_input(["skeleton", "--weights", "a.safetensors", "--input", "a.ply"], "a.safetensors")
+        self.bad_input(["skeleton", "--weights", "a.safetensors", "--source", "a.ply"], "a.safetensors")
 
 
 class Interrupted(CliTest):

@@ -36,6 +36,16 @@ class Usage(CliTest):
                 if flag != "--help":
                     self.assertRegex(examples, re.escape(flag) + "(?![a-z-])", "restage " + " ".join(words))
 
+    def test_every_default_is_shown(self):
+        seen = 0
+        for words, page in self.commands():
+            for entry in re.split(r"\n(?=  -)", page.partition("Examples:")[0])[1:]:
+                takes_a_value = re.match(r"  (-\S+) (?:TEXT|INT|UINT|FLOAT)\S*(?: x \d+| \.\.\.)?( REQUIRED)?", entry)
+                if takes_a_value and not takes_a_value[2]:
+                    seen += 1
+                    self.assertIn("(default: ", entry, "restage %s %s" % (" ".join(words), takes_a_value[1]))
+        self.assertGreater(seen, 150)
+
     def completed(self, *words):
         """What bash offers for a half-written line."""
         script = self.write("completion.bash", self.done("completion", "bash"))
@@ -75,7 +85,7 @@ class Usage(CliTest):
         self.assertIn("skeleton", self.done("train", "demo", "--print-config"))
         self.assertIn("transfer", self.done("train", "npt/lite", "--print-config"))
         self.bad_input(["train", "npt/lit", "--print-config"], "did you mean 'npt/lite'")
-        self.assertIn("trials", self.done("sweep", "plan", "experiments/ours_switches/sweep.yaml"))
+        self.assertIn("trials", self.done("sweep", "plan", "experiments/studies/ours_switches/sweep.yaml"))
         self.bad_input(["doctor"], "--self")
         self.bad_input(["doctor", "x.ply", "--self"], "--self")
         self.bad_input(["doctor", "--self", "--picture", "p.png"], "--self alone")
@@ -101,9 +111,9 @@ class Usage(CliTest):
         self.bad_input(["doctor", "x", "--seed", "-1"], "--seed")
         self.bad_input(["doctor", "x", "--seed", str(2 ** 64)], "--seed")
         for out in ("", "-"):
-            self.bad_input(["skeleton", "--weights", "w", "--input", "x", "--out", out], "--out")
+            self.bad_input(["skeleton", "--weights", "w", "--source", "x", "--out", out], "--out")
         for empty in (["--weights", ""], ["--weights="]):
-            self.bad_input(["skeleton", *empty, "--input", "x"], "--weights is empty")
+            self.bad_input(["skeleton", *empty, "--source", "x"], "--weights is empty")
         self.bad_input(["eval", "--pred", "a.h5", "--truth", "b.h5", "--anchor", 1], "--anchor")
         self.bad_input(["eval", "--pred", "a.h5", "--truth", "b.h5", "--out", "x"], "--out")
         self.bad_input(["eval", "run=x", "--every", 2], "--every")

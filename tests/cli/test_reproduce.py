@@ -2,6 +2,7 @@
 import glob
 import json
 import os
+import re
 import shutil
 import struct
 
@@ -54,7 +55,7 @@ class Reproduce(CliTest):
         self.write("experiments/one/README.md", "# One\n")
 
     def reproduce(self, *words):
-        return self.json("reproduce", "somebody2024", "--quiet", *words)
+        return self.json("reproduce", "somebody2024", "--experiments", "experiments", "--quiet", *words)
 
     def text(self, name):
         return self.bytes(name).decode()
@@ -71,11 +72,13 @@ class Reproduce(CliTest):
         for f in helps["findings"]:
             self.assertEqual(f["verdict"], "holds" if f["high"] < 0 else "does not hold" if f["low"] > 0 else "cannot be told")
         self.assertEqual(beats["verdict"], "not run")
-        page = self.text("r/somebody2024.md")
+        page, table = self.text("r/somebody2024.md"), self.text("r/somebody2024/one.md")
+        for part in ("training helps", "not run", "(somebody2024/one.md)", "(../experiments/one/README.md)", "6 done"):
+            self.assertIn(part, page)
         for part in ("training helps", "ours (paper)", "theirs is not run: it is nobody's", "| **trained**", "Tiny.", "foot slide",
-                     "(experiments/one/README.md)", "restage sweep run experiments/one/sweep.yaml"):
-            self.assertIn(part.replace("(experiments", "(../experiments"), page)
-        self.assertEqual(sorted(os.listdir(self.path("r/somebody2024"))), ["one.csv", "one.svg", "one.tex"])
+                     "(../../experiments/one/README.md)", "(../somebody2024.md)", "restage sweep run experiments/one/sweep.yaml"):
+            self.assertIn(part, table)
+        self.assertEqual(sorted(os.listdir(self.path("r/somebody2024"))), ["one.csv", "one.md", "one.svg", "one.tex"])
         kept = sorted(n for n in os.listdir(self.path("experiments/one/results")) if n != "references")
         self.assertEqual((len(kept), kept[-1]), (7, "lite.json"))
         self.assertNotIn("host", self.text("experiments/one/results/" + kept[0]))
@@ -98,7 +101,8 @@ class Reproduce(CliTest):
             self.assertEqual({k: v for k, v in ran.items() if k not in ("host", "command")}, taken, "every digit is there")
         os.remove(self.path("tiny.yaml"))
         self.assertEqual(self.reproduce("--budget", "lite", "--out", "page/work", "--page", "page", "--no-run"), found)
-        head = lambda text: text[text.index("Claims:"):]
+        self.assertEqual(self.text("page/somebody2024/one.md"), table)
+        head = lambda text: text[:text.index("Made by")]
         self.assertEqual(head(self.text("page/somebody2024.md")), head(page))
 
     @needs_data("body/makehuman.h5")
@@ -115,12 +119,12 @@ class Reproduce(CliTest):
         shapes = []
         for number in (1, 2):
             name = "r/somebody2024/one-%d.jpg" % number
-            self.assertIn("(%s)" % name[2:], self.text("r/somebody2024.md"))
+            self.assertIn("(one-%d.jpg)" % number, self.text("r/somebody2024/one.md"))
             shapes.append(jpeg_size(self.bytes(name)))
         # Lines of cells: source, rows, truth; columns: moments.
         self.assertAlmostEqual(shapes[0][0] / shapes[1][0], 4 / 3, 1)
         self.assertAlmostEqual(shapes[0][1] / shapes[1][1], 2 / 6, 1)
-        self.assertIn("The worst: " + os.listdir(self.path("small/naked"))[0], self.text("r/somebody2024.md"))
+        self.assertIn("The worst: " + os.listdir(self.path("small/naked"))[0], self.text("r/somebody2024/one.md"))
         # The lowest seed's; the same bytes again; from results without weights the picture stays as it is.
         first = [self.bytes("r/somebody2024/one-%d.jpg" % n) for n in (1, 2)]
         self.reproduce("--budget", "lite", "--out", "r")
@@ -130,21 +134,26 @@ class Reproduce(CliTest):
         os.remove(self.path("r/somebody2024/one-2.jpg"))
         self.reproduce("--budget", "lite", "--out", "r", "--no-run")
         self.assertEqual(self.bytes("r/somebody2024/one-1.jpg"), b"kept")
-        self.assertIn("one-1.jpg", self.text("r/somebody2024.md"))
-        self.assertNotIn("one-2.jpg", self.text("r/somebody2024.md"))
+        self.assertIn("one-1.jpg", self.text("r/somebody2024/one.md"))
+        self.assertNotIn("one-2.jpg", self.text("r/somebody2024/one.md"))
         # Bad recipes.
         for change, *contains in ((("rows: [trained]", "rows: [traind]"), "traind", "trained"), (("worst: 1, ", ""), "'worst'"),
                                   (("set: scans", "set: scan"), "scan"), (("rows: [trained]", "rows: []"), "'rows' is empty")):
             self.write("experiments/one/paper.yaml", own + pictures.replace(*change))
-            self.bad_input(["reproduce", "somebody2024", "--budget", "lite", "--out", "r"], "paper.yaml:", *contains)
+            self.bad_input(["reproduce", "somebody2024", "--experiments", "experiments", "--budget", "lite", "--out", "r"], "paper.yaml:", *contains)
 
     def test_too_few_seeds_tell_nothing_and_words_make_other_trials(self):
         found = self.reproduce("--budget", "smoke", "--out", "r")
-        self.assertEqual(found["claims"][0]["verdict"], "cannot be told")
+        self.assertEqual(found["claims"][0]["verdict"], "cannot be told at smoke")
+        self.assertEqual(found["claims"][0]["too_short"], [], "trained to its end, as the kept curve shows")
+        self.assertEqual({f["verdict"] for f in found["claims"][0]["findings"]}, {"cannot be told"})
         self.assertEqual(found["trials"]["one"]["all"], 2)
+        short = self.reproduce("--budget", "smoke", "--out", "short", "loop.validate_every=1000")["claims"][0]
+        self.assertEqual((short["verdict"], short["so_far"]), ("not trained far enough", "cannot be told"))
+        self.assertIn("and needs 5", short["too_short"][0])
         more = self.reproduce("--budget", "smoke", "--out", "r", "seeds=1,2,3")
         self.assertEqual(more["trials"]["one"], {"done": 6, "all": 6})
-        self.assertEqual(self.text("r/somebody2024.md").count("* theirs is not run"), 1)
+        self.assertEqual(self.text("r/somebody2024/one.md").count("* theirs is not run"), 1)
 
     def test_nothing_was_run(self):
         found = self.reproduce("--budget", "lite", "--out", "r", "--no-run")
@@ -152,14 +161,14 @@ class Reproduce(CliTest):
         self.assertEqual(found["trials"]["one"]["done"], 0)
 
     def test_bad_input(self):
-        how = ["--budget", "smoke", "--out", "r"]
+        how = ["--budget", "smoke", "--out", "r", "--experiments", "experiments"]
         self.bad_input(["reproduce", "somebody2023", *how], "somebody2023", "somebody2024")
         self.bad_input(["reproduce", "somebody2024", "--table", "7", *how], "'7'", "there are 1")
         self.bad_input(["reproduce", "somebody2024", "--budget", "big", "--out", "r"], "big")
         self.bad_input(["reproduce", "somebody2024", *how, "--jobs", "0"], "--jobs 0")
         self.bad_input(["reproduce", "somebody2024", *how, "seeds"], "'seeds'")
         self.bad_input(["reproduce", "somebody2024", *how, "--no-run", "seeds=1"], "'seeds=1'")
-        self.bad_input(["reproduce", "somebody2024", *how, "--from", "nowhere"], "nowhere", "--from")
+        self.bad_input(["reproduce", "somebody2024", *how[:4], "--experiments", "nowhere"], "nowhere", "--experiments")
         self.bad_input(["reproduce", "somebody2024", *how, "motion.windos.frames=5"], "windos")
         self.write("experiments/one/paper.yaml", PAPER.replace("row: trained", "row: traind"))
         self.bad_input(["reproduce", "somebody2024", *how], "paper.yaml:", "traind")
@@ -175,12 +184,60 @@ class OurFolders(CliTest):
     def test_pages(self):
         for name in ("experiments", "configs"):
             os.symlink(os.path.join(ROOT, name), self.path(name))
+        committed = os.path.join(ROOT, "docs", "reproduction")
         for paper in ("rekik2024", "marsot2023", "chen2023"):
             found = self.json("reproduce", paper, "--budget", "lite", "--out", "r", "--no-run", "--quiet")
             self.assertGreater(len(found["claims"]), 0)
-            self.assertIn("# " + paper, self.bytes("r/%s.md" % paper).decode())
+            page = self.bytes("r/%s.md" % paper).decode()
+            self.assertTrue(page.startswith("# %s, run again\n\nClaims: " % paper))
+            self.assertEqual(len(set(re.findall(r"\(%s/(\w+\.md)\)" % paper, page))), len(found["trials"]))
+            same = lambda text: re.sub("[ -]+", " ", re.sub(r"\([^)]*/experiments/", "(experiments/", text.split("## ")[0]))
+            with open(os.path.join(committed, paper + ".md"), encoding="utf-8") as file:
+                self.assertEqual(same(page), same(file.read()), "the committed page is that of the committed results")
             bones = [claim["verdict"] for claim in found["claims"] if "bone length preservation" in claim["says"]]
-            self.assertEqual(bones, ["holds"] if paper == "marsot2023" else [], "no improvement was claimed, and it got worse")
+            self.assertEqual(bones, ["not trained far enough"] if paper == "marsot2023" else [], "no curve was kept")
+
+    def test_what_the_papers_budget_means(self):
+        """Without any data; tests/experiments/schedule_test.cpp compares it with what is printed."""
+        found = self.json("reproduce", "chen2023", "--table", "1", "--budget", "paper", "--plan", "--quiet")
+        lart = next(row for row in found["rows"] if row["row"] == "LART")
+        self.assertEqual((lart["stage"], lart["model"], lart["steps"], lart["batch"], lart["rate"], lart["hours"]),
+                         ("transfer", "transfer/lart", 200000, 2, 5e-5, None))
+        rows = self.json("reproduce", "rekik2024", "--table", "4.4-extractor", "--budget", "smoke", "--plan", "--quiet")["rows"]
+        self.assertEqual(len(rows), 3)
+        self.assertTrue(all(row["hours"] is not None for row in rows), "also of networks that need two examples")
+        self.bad_input(["reproduce", "chen2023", "--budget", "lite", "--plan", "data.source=none.h5"], "none.h5", "not there")
+        # With data, hours: of a step of two examples, as many times as there are examples.
+        self.write("experiments/one/paper.yaml", PAPER)
+        self.write("experiments/one/sweep.yaml", SWEEP)
+        self.write("tiny.yaml", BASE)
+        rows = self.json("reproduce", "somebody2024", "--budget", "lite", "--plan", "--experiments", "experiments")["rows"]
+        self.assertEqual({(row["row"], row["stage"], row["batch"]) for row in rows}, {("trained", "motion", 4), ("untrained", "motion", 4)})
+        for row in rows:
+            self.assertTrue(0 <= row["hours"] < 0.1, row)
+        self.assertIn("hours", self.done("reproduce", "somebody2024", "--budget", "lite", "--plan", "--experiments", "experiments"))
+
+    def test_claims_by_the_papers_own_figures(self):
+        for paper in ("rekik2024", "marsot2023", "chen2023"):
+            found = self.json("reproduce", paper, "--printed")
+            self.assertEqual({claim["verdict"] for claim in found["claims"]}, {"holds"}, found["claims"])
+        self.write("experiments/one/paper.yaml", PAPER.replace("claims:", "contradicted: [no wonder]\nclaims:"))
+        self.write("experiments/one/sweep.yaml", SWEEP)
+        found = self.json("reproduce", "somebody2024", "--printed", "--experiments", "experiments")
+        self.assertEqual(found["contradicted"], ["no wonder"])
+        for words, *contains in ((["--printed", "--plan"], "two questions"), (["--printed", "--budget", "lite"], "--budget has no effect beside --printed"),
+                                 (["--plan"], "--budget is missing"), (["--budget", "lite"], "--out is missing"),
+                                 (["--plan", "--budget", "lite", "--out", "r"], "--out has no effect beside --plan"),
+                                 (["--printed", "seeds=1"], "WORDS has no effect")):
+            self.bad_input(["reproduce", "somebody2024", "--experiments", "experiments", *words], *contains)
+
+    def test_codecheck_names_every_table(self):
+        """The manifest names each page and each table of both papers, and only files that are there."""
+        with open(os.path.join(ROOT, "docs", "reproduction", "codecheck.yml"), encoding="utf-8") as file:
+            named = {n for n in re.findall(r"- file: (\S+)", file.read()) if n.startswith("docs/reproduction/")}
+        there = {os.path.relpath(f, ROOT) for paper in ("rekik2024", "marsot2023") for ending in (".md", "/*.md", "/*.csv")
+                 for f in glob.glob(os.path.join(ROOT, "docs", "reproduction", paper + ending))}
+        self.assertEqual(named, there)
 
     def test_what_is_committed_is_light_and_whole(self):
         """At most 9 MB of results and pages; every reference of a result is there, and none that no result names."""
@@ -188,7 +245,7 @@ class OurFolders(CliTest):
                  for f in glob.glob(os.path.join(ROOT, part), recursive=True) if os.path.isfile(f)]
         self.assertGreater(len(files), 100)
         self.assertLess(sum(map(os.path.getsize, files)), 9e6, "committed results and pictures; see experiments/reproduce/evidence.h")
-        for folder in glob.glob(os.path.join(ROOT, "experiments", "*", "results")):
+        for folder in glob.glob(os.path.join(ROOT, "experiments", "studies", "*", "results")):
             named = set()
             for name in glob.glob(os.path.join(folder, "*.json")):
                 with open(name, encoding="utf-8") as file:

@@ -53,6 +53,16 @@ class Gaps(CliTest):
         self.done("data", "verify", "out.h5")
         return [m["frame"] for m in found["missing"]], found["filled"], [m["why"] for m in found["missing"]]
 
+    def test_missing_numbers_are_told_at_any_rate(self):
+        for k, (name, frame) in enumerate(zip(self.names, self.frames)):
+            if k not in (7, 12):
+                self.ply("holes/" + name, frame)
+        for every in (1, 2, 3):
+            result = self.restage(*self.call("out.h5", "--every", every, source="holes"))
+            self.assertEqual(result.code, 0, result.err)
+            self.assertIn("2 numbers are missing in the names of the frames", result.err, "--every %d" % every)
+        self.assertNotIn("missing in the names", self.restage(*self.call("out.h5", "--every", 2)).err)
+
     def test_every_kind_of_bad_frame(self):
         few, cut = self.frames[0][:10], self.bytes("good/" + self.names[0])[:-30]
         huge = [(100 * x, 100 * y, 100 * z) for x, y, z in self.frames[0]]
@@ -74,10 +84,10 @@ class Gaps(CliTest):
         lying = [(x, -z, y) for x, y, z in self.frames[9]]
         large = [(2.5 * x, 2.5 * y, 2.5 * z) for x, y, z in self.frames[9]]
         self.done(*self.call("good.h5"))
-        for name, frame in (("lying", lying), ("large", large)):
+        for name, frame, fault in (("lying", lying, "turned by"), ("large", large, "nobody who can be made out")):
             missing, filled, why = self.filled(self.source(name, {9: frame}))
             self.assertEqual((missing, filled), ([9], [9]), name)
-            self.assertIn("nobody who can be made out", why[0])
+            self.assertIn(fault, why[0])
             told = self.json("eval", "--pred", "out.h5", "--truth", "good.h5")
             self.assertLess(told["mean"]["mpjpe"], 0.004, name)
             self.assertEqual(self.filled(name, force=True)[:2], ([], []), name)

@@ -18,6 +18,7 @@ import unittest
 
 import browser
 from support import CliTest, PROGRAM, ROOT
+from test_arrays import npy
 from test_gltf import character
 
 LITE = os.path.join(ROOT, "experiments", "weights", "lite.safetensors")
@@ -145,7 +146,7 @@ class StreamTest(CliTest):
 
     def stream(self, source, *more, target=None):
         """The program, once it says that it is ready."""
-        command = [PROGRAM, "stream", "--target", target or self.target, "--in", source, "--vmc", "127.0.0.1:%d" % self.receiver.port,
+        command = [PROGRAM, "stream", "--target", target or self.target, "--source", source, "--vmc", "127.0.0.1:%d" % self.receiver.port,
                    "--weights", LITE, "--json", *more]
         process = subprocess.Popen(command, cwd=self.folder, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
         for clean in (process.stderr.close, process.stdout.close, process.stdin.close, process.wait, process.kill):
@@ -274,10 +275,25 @@ class Streams(StreamTest):
 
     def test_without_standard_input(self):
         command = '"$@" <&-'
-        done = subprocess.run(["sh", "-c", command, "sh", PROGRAM, "stream", "--target", self.target, "--in", "-", "--vmc",
+        done = subprocess.run(["sh", "-c", command, "sh", PROGRAM, "stream", "--target", self.target, "--source", "-", "--vmc",
                                "127.0.0.1:%d" % self.receiver.port, "--weights", LITE, "--json"], cwd=self.folder, capture_output=True, timeout=30)
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertIn(b"no frame came", done.stderr)
+
+    def test_points_far_from_all_others(self):
+        """Sensors' far away mistakes are left out, as `retarget` leaves them out."""
+        self.clouds = [points + [(40, 3, -20)] for points in self.clouds]
+        process = self.stream("-")
+
+        def send(data):
+            process.stdin.write(data)
+            process.stdin.flush()
+        bundles = [self.answer(send, points, k / 30) for k, points in enumerate(self.clouds)]
+        self.check_same(bundles, self.target)
+        process.stdin.close()
+        process.stdin = None
+        document, _ = self.ended(process)
+        self.assertEqual(document["points_left_out"], 16)
 
     def test_a_cloud_of_very_many_points(self):
         process = self.stream("-")
@@ -344,6 +360,7 @@ class Streams(StreamTest):
         second = self.sender(port)
         second.sendall(b"\xff" * 100)  # garbage
         self.assertEqual(second.recv(1), b"")
+        time.sleep(2.2)
         third = self.sender(port)  # the stalled one is replaced
         self.answer(third.sendall, self.clouds[0], 50)
         third.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
@@ -357,6 +374,64 @@ class Streams(StreamTest):
             self.assertIn(words, err)
         self.assertEqual((document["frames_in"], document["frames_out"], document["dropped_because"]["unusable"]), (8, 5, 3))
         self.assertEqual((document["restarts"], document["points_left_out"]), (2, 1))
+
+    def test_two_senders_that_connect_again(self):
+        """Two programs that send to one port: one of them is heard until it ends, whatever the other does."""
+        port = free_port()
+        process = self.stream("tcp://127.0.0.1:%d" % port)
+        first, k, refused = self.sender(port), 0, 0
+        self.answer(first.sendall, self.clouds[0], 0)
+        for _ in range(3):
+            other = self.sender(port)
+            for _ in range(3):
+                k += 1
+                other.sendall(frame(1000 + k / 30, self.clouds[1]))
+                refused += 1
+                self.answer(first.sendall, self.clouds[k], k / 30)
+            other.close()
+        other = self.sender(port)
+        first.close()
+        time.sleep(0.2)
+        self.answer(other.sendall, self.clouds[0], 2000)
+        document, err = self.interrupted(process)
+        self.assertEqual((document["frames_out"], document["restarts"]), (11, 1), err)
+        self.assertEqual(document["dropped_because"]["other_sender"], refused)
+        self.assertRegex(err, "sender [0-9]+ is not heard: sender 1 is sending; end one of the two")
+
+    def test_a_clock_that_counts_milliseconds(self):
+        port = free_port()
+        process = self.stream("tcp://127.0.0.1:%d" % port)
+        send = self.sender(port).sendall
+        start = time.monotonic()
+        for k in range(40):
+            time.sleep(max(0, start + k / 30 - time.monotonic()))
+            send(frame(1e6 + 1000 * k / 30, self.clouds[k % 16]))
+        document, err = self.interrupted(process)
+        self.assertLess(document["restarts"], 6, err)
+        self.assertEqual(err.count("counts milliseconds"), 1, err)
+        self.assertGreater(document["frames_out"], 20, err)
+
+    def test_clouds_that_come_too_slowly(self):
+        port = free_port()
+        process = self.stream("tcp://127.0.0.1:%d" % port)
+        send = self.sender(port).sendall
+        for k in range(7):
+            self.answer(send, self.clouds[k], k / 2)
+            time.sleep(0.5)
+        document, err = self.interrupted(process)
+        self.assertEqual(document["restarts"], 6)
+        self.assertEqual(err.count("the motion begins anew with every cloud"), 1, err)
+
+    def test_a_file_of_many_clouds_in_the_folder(self):
+        os.mkdir(self.path("in"))
+        process = self.stream("in", "--seconds", "4")
+        values = [x for k in range(10) for point in self.clouds[k % 2][:500] for x in point]
+        self.write("part", npy((10, 500, 3), values, "<f4"))
+        os.rename(self.path("part"), self.path("in/walk.npy"))
+        self.assertIsNotNone(self.receiver.next())
+        document, err = self.ended(process)
+        self.assertEqual((document["frames_in"], document["frames_out"], document["dropped_because"]["overtaken"]), (10, 1, 9))
+        self.assertIn("walk.npy holds 10 clouds, and the last is taken; write one cloud a file", err)
 
     def test_clocks_that_jump_stand_or_go_back(self):
         port = free_port()
@@ -447,7 +522,7 @@ class Streams(StreamTest):
 
     def test_ends_after_so_many_seconds(self):
         start = time.monotonic()
-        document = json.loads(self.done("stream", "--target", self.target, "--in", "tcp://127.0.0.1:%d" % free_port(), "--vmc",
+        document = json.loads(self.done("stream", "--target", self.target, "--source", "tcp://127.0.0.1:%d" % free_port(), "--vmc",
                                         "127.0.0.1:%d" % self.receiver.port, "--weights", LITE, "--seconds", "0.5", "--json"))
         self.assertLess(time.monotonic() - start, 20)
         self.assertEqual(document["latency_ms"], {"p50": None, "p99": None, "max": None})
@@ -456,7 +531,7 @@ class Streams(StreamTest):
     def test_bad_input_is_one_line(self):
         os.mkdir(self.path("in"))
         self.write("file", "x")
-        good = {"--target": self.target, "--in": "in", "--vmc": "127.0.0.1:%d" % self.receiver.port, "--weights": LITE}
+        good = {"--target": self.target, "--source": "in", "--vmc": "127.0.0.1:%d" % self.receiver.port, "--weights": LITE}
 
         def call(**other):
             options = {**good, **{"--" + key: value for key, value in other.items()}}
@@ -464,13 +539,13 @@ class Streams(StreamTest):
         for port in ("0", "65536", "x", "127.0.0.1", "127.0.0.1:", "127.0.0.1:-1", "127.0.0.1:1x"):
             self.bad_input(call(vmc=port), "--vmc", "port")
             self.bad_input(call(ws=port), "--ws", "port")
-            self.bad_input(call(**{"in": "tcp://" + port}), "--in", "port")
+            self.bad_input(call(**{"source": "tcp://" + port}), "--source", "port")
         self.bad_input(call(ws=":"), "--ws", "port")
         self.bad_input(call(vmc="no.such.host.invalid:39539"), "--vmc", "no.such.host.invalid")
-        self.bad_input(call(**{"in": "tcp://192.0.2.1:9000"}), "--in", "192.0.2.1")  # no address of this machine
-        self.bad_input(call(**{"in": "nowhere"}), "nowhere", "no such folder")
-        self.bad_input(call(**{"in": "file"}), "file", "no folder")
-        self.bad_input(call(**{"in": "udp://127.0.0.1:1"}), "--in", "udp://")
+        self.bad_input(call(**{"source": "tcp://192.0.2.1:9000"}), "--source", "192.0.2.1")  # no address of this machine
+        self.bad_input(call(**{"source": "nowhere"}), "nowhere", "no such folder")
+        self.bad_input(call(**{"source": "file"}), "file", "no folder")
+        self.bad_input(call(**{"source": "udp://127.0.0.1:1"}), "--source", "udp://")
         self.bad_input(call(target="nobody.ply"), "nobody.ply")
         self.bad_input(call(weights="nothing.safetensors"), "nothing.safetensors")
         self.bad_input(call(seconds="0"), "--seconds")
@@ -484,9 +559,9 @@ class Streams(StreamTest):
             busy.bind(("127.0.0.1", 0))
             busy.listen()
             port = busy.getsockname()[1]
-            self.bad_input(call(**{"in": "tcp://127.0.0.1:%d" % port}), "--in", "in use")
+            self.bad_input(call(**{"source": "tcp://127.0.0.1:%d" % port}), "--source", "in use")
             self.bad_input(call(ws=str(port)), "--ws", "in use")
-            self.bad_input(call(**{"in": "tcp://127.0.0.1:%d" % port, "ws": str(port)}), "same port")
+            self.bad_input(call(**{"source": "tcp://127.0.0.1:%d" % port, "ws": str(port)}), "same port")
 
 
 if __name__ == "__main__":

@@ -31,7 +31,7 @@ class Doctor(CliTest):
 
     def test_foreign_axes_and_units_are_found_and_mended(self):
         person = self.person()
-        found = self.doctor(self.ply("good.ply", person), 0, "--target")
+        found = self.doctor(self.ply("good.ply", person), 0, "--as-target")
         self.assertEqual(found["notes"], [])
         self.ply("foreign.ply", [(100 * x, -100 * z, 100 * y) for x, y, z in person])
         found = self.doctor("foreign.ply", 1)
@@ -140,9 +140,9 @@ class Render(CliTest):
             self.ply("scans/s%d.ply" % i, points(150 + i, i))
 
     def test_sheet_and_page(self):
-        self.done("render", "result.h5", "--source", "scans", "--truth", "result.h5", "--out", "sheet.png")
+        self.done("view", "result.h5", "--compare", "scans", "--truth", "result.h5", "--out", "sheet.png")
         self.assertEqual(self.bytes("sheet.png")[:8], b"\x89PNG\r\n\x1a\n")
-        self.done("render", "result.h5", "--source", "scans", "--out", "page.html")
+        self.done("view", "result.h5", "--compare", "scans", "--out", "page.html")
         page = self.bytes("page.html").decode()
         self.assertIn("<html", page.lower())
         for outside in ("src=\"http", "href=\"http", "@import", "fetch("):
@@ -150,34 +150,35 @@ class Render(CliTest):
 
     def test_close_up_of_a_joint(self):
         width = lambda name: int.from_bytes(self.bytes(name)[16:20], "big")
-        self.done("render", "result.h5", "--focus", "left_wrist", "--within", "0.2", "--azimuth", "90", "--out", "hand.png", "--columns", "3")
-        self.done("render", "result.h5", "--focus", "head", "--within", "0.2", "--azimuth", "90", "--out", "head.png", "--columns", "3")
+        self.done("view", "result.h5", "--look", "left_wrist", "--within", "0.2", "--azimuth", "90", "--out", "hand.png", "--columns", "3")
+        self.done("view", "result.h5", "--look", "neck", "--within", "0.2", "--azimuth", "90", "--out", "head.png", "--columns", "3")
         self.assertEqual(width("hand.png"), width("head.png"))
         self.assertNotEqual(self.bytes("hand.png"), self.bytes("head.png"))
-        self.bad_input(["render", "result.h5", "--focus", "left_rist", "--out", "a.png"], "left_wrist")
-        self.bad_input(["render", "result.h5", "--focus", "head", "--out", "a.html"], "--focus")
-        self.bad_input(["render", "result.h5", "--source", "scans", "--focus", "head", "--out", "a.png"], "scans", "joints")
-        self.bad_input(["render", "result.h5", "--focus", "head", "--within", "0", "--out", "a.png"], "--within")
-        self.bad_input(["render", "result.h5", "--within", "0.2", "--out", "a.png"], "--within", "--focus")
-        self.bad_input(["render", "result.h5", "--azimuth", "nan", "--out", "a.png"], "--azimuth")
-        self.bad_input(["render", "result.h5", "--azimuth", "9", "--out", "a.html"], "--azimuth", "sheet")
+        self.bad_input(["view", "result.h5", "--look", "left_rist", "--out", "a.png"], "left_wrist")
+        self.bad_input(["view", "result.h5", "--look", "head", "--out", "a.html"], "--look")
+        self.bad_input(["view", "result.h5", "--compare", "scans", "--look", "head", "--out", "a.png"], "scans", "joints")
+        self.bad_input(["view", "result.h5", "--look", "head", "--within", "0", "--out", "a.png"], "--within")
+        self.bad_input(["view", "result.h5", "--within", "0.2", "--out", "a.png"], "--within", "--look")
+        self.bad_input(["view", "result.h5", "--azimuth", "nan", "--out", "a.png"], "--azimuth")
+        self.bad_input(["view", "result.h5", "--azimuth", "9", "--out", "a.html"], "--azimuth", "sheet")
 
     def test_joints_alone_and_single_meshes(self):
         self.h5("joints.h5", joints=([2, 22, 3], numbers(132, 1)))
-        self.done("render", "joints.h5", "--out", "a.png")
-        self.done("render", self.ply("one.ply", TETRAHEDRON, FACES), "--out", "b.png")
+        self.done("view", "joints.h5", "--columns", 2, "--out", "a.png")
+        self.done("view", self.ply("one.ply", TETRAHEDRON, FACES), "--columns", 2, "--out", "b.png")
 
     def test_bad_input(self):
-        self.bad_input(["render", "result.h5", "--out", "sheet.gif"], "sheet.gif")
-        self.bad_input(["render", "none.h5", "--out", "sheet.png"], "none.h5")
-        self.bad_input(["render", "result.h5", "--out", "nowhere/sheet.png"], "nowhere")
-        self.bad_input(["render", "result.h5", "--out", "sheet.png", "--sequence", 1], "sequence")
-        self.bad_input(["render", "result.h5", "--source", self.ply("e.ply", []), "--out", "sheet.png"], "e.ply")
+        self.bad_input(["view", "result.h5", "--compare", "source", "--out", "sheet.bmp"], "sheet.bmp")
+        self.bad_input(["view", "none.h5", "--compare", "source", "--out", "sheet.png"], "none.h5")
+        self.bad_input(["view", "result.h5", "--compare", "scans", "--out", "nowhere/sheet.png"], "nowhere")
+        self.bad_input(["view", "result.h5", "--compare", "scans", "--out", "sheet.png", "--sequence", 1], "sequence")
+        self.bad_input(["view", "result.h5", "--compare", "source", "--out", "sheet.png"], "made from")
+        self.bad_input(["view", "result.h5", "--compare", self.ply("e.ply", []), "--out", "sheet.png"], "e.ply")
         for i in range(3):
             self.ply("scans/s%d.ply" % i, [])
-        self.bad_input(["render", "result.h5", "--source", "scans", "--out", "sheet.png"], "s0.ply")
+        self.bad_input(["view", "result.h5", "--compare", "scans", "--out", "sheet.png"], "s0.ply")
 
     def test_full_disk(self):
-        result = self.restage("render", "result.h5", "--source", "scans", "--out", "sheet.png", before=small_disk)
+        result = self.restage("view", "result.h5", "--compare", "scans", "--out", "sheet.png", before=small_disk)
         self.one_line(result, 1, "sheet.png")
         self.assertNotIn("sheet.png", os.listdir(self.folder))

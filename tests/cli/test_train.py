@@ -82,7 +82,7 @@ class Runs(Train):
         plain = self.train("tiny.yaml", "skeleton.from=" + first, "seed=2")
         encoder = self.train("tiny.yaml", "skeleton.from=" + first, "motion.init=" + first, "motion.init_names=[smrm.enc.*]", "seed=2")
         def part(where, model):
-            self.done("weights", "export", "--from", where, "--model", model, "--out", "part.safetensors")
+            self.done("weights", "export", "--source", where, "--model", model, "--out", "part.safetensors")
             return self.bytes("part.safetensors")
         self.assertEqual(part(run, "skeleton"), part(first, "skeleton"))
         self.assertEqual(self.checkpoints(run)[-1].split("-")[0], "motion")
@@ -108,8 +108,8 @@ class Runs(Train):
 
     def test_what_must_be_known_of_the_weights_is_kept(self):
         run = self.train("tiny.yaml", "motion.windows.remove_heading=true", "motion.windows.translation=relative")
-        self.done("weights", "export", "--from", run, "--model", "smrm", "--out", "alone.safetensors")
-        self.done("weights", "import", "--from", "alone.safetensors", "--model", "smrm/rot6d", "--with", run, "--out", "again.safetensors")
+        self.done("weights", "export", "--source", run, "--model", "smrm", "--out", "alone.safetensors")
+        self.done("weights", "import", "--source", "alone.safetensors", "--model", "smrm/rot6d", "--with", run, "--out", "again.safetensors")
         self.assertEqual(self.bytes("again.safetensors"), self.weights_of(run))
 
     def test_run_directory(self):

@@ -2,8 +2,10 @@
 import json
 import math
 import os
+import signal
 import struct
 import subprocess
+import time
 import unittest
 import zlib
 
@@ -146,7 +148,7 @@ class View(CliTest):
         return [sum(p[k] > 90 and p[k] > 1.6 * max(p[j] for j in range(3) if j != k) for p in flat) for k in range(3)]
 
     def test_a_picture_has_the_files_own_picture(self):
-        rows = self.picture("--from", "front", "--frame", 0)
+        rows = self.picture("--side", "front", "--frame", 0)
         self.assertEqual((len(rows), len(rows[0])), (100, 80))
         middle = rows[50]
         reds = [x for x, p in enumerate(middle) if p[0] > 200 and p[1] < 60]
@@ -154,7 +156,7 @@ class View(CliTest):
         self.assertGreater(len(reds), 10)
         self.assertGreater(len(greens), 10)
         self.assertLess(max(reds), min(greens))
-        self.assertEqual(self.colours(self.picture("--from", "back", "--frame", 0))[1], 0)
+        self.assertEqual(self.colours(self.picture("--side", "back", "--frame", 0))[1], 0)
 
     def test_clips_frames_and_times(self):
         first, last = self.picture("--clip", "bend", "--frame", 0), self.picture("--clip", "bend", "--frame", 30)
@@ -185,15 +187,15 @@ class View(CliTest):
     def test_masks_veils_and_colours(self):
         def alpha(mode, **more):
             return lambda r: r["materials"][0].update(alphaMode=mode, **more)
-        opaque = self.colours(self.picture("--from", "front"))
+        opaque = self.colours(self.picture("--side", "front"))
         self.changed("mask.glb", alpha("MASK"))
-        masked = self.colours(self.picture("--from", "front", file="mask.glb"))
+        masked = self.colours(self.picture("--side", "front", file="mask.glb"))
         self.assertEqual(masked[1], 0, "the green half has no opacity")
         self.assertGreater(masked[0], 0.9 * opaque[0])
         self.changed("blend.glb", alpha("BLEND"))
-        self.assertEqual(self.colours(self.picture("--from", "front", file="blend.glb"))[1], 0)
+        self.assertEqual(self.colours(self.picture("--side", "front", file="blend.glb"))[1], 0)
         self.changed("blue.glb", lambda r: r["materials"][0].update(pbrMetallicRoughness={"baseColorFactor": [0, 0, 1, 1]}))
-        self.assertGreater(self.colours(self.picture("--from", "front", file="blue.glb"))[2], sum(opaque) * 0.9)
+        self.assertGreater(self.colours(self.picture("--side", "front", file="blue.glb"))[2], sum(opaque) * 0.9)
 
     def test_pictures_that_cannot_be_decoded(self):
         def damage(root):
@@ -201,7 +203,7 @@ class View(CliTest):
             view["byteLength"] //= 2
             root["materials"][0]["pbrMetallicRoughness"]["baseColorFactor"] = [0, 0, 1, 1]
         self.changed("broken.glb", damage)
-        result = self.restage("view", "broken.glb", "--size", "80x100", "--from", "front", "--out", "out.png")
+        result = self.restage("view", "broken.glb", "--size", "80x100", "--side", "front", "--out", "out.png")
         self.assertEqual(result.code, 0, result.err)
         self.assertIn("the picture 'front' is not drawn", result.err)
         self.assertGreater(self.colours(pixels(self.bytes("out.png")))[2], 500)
@@ -280,7 +282,7 @@ class View(CliTest):
         self.write("bin/xdg-open", '#!/bin/sh\ncp "$1" "%s"\n' % self.path("opened.html"))
         os.chmod(self.path("bin/xdg-open"), 0o755)
         os.makedirs(self.path("tmp"))
-        for name, value in (("DISPLAY", ":7"), ("TMPDIR", self.path("tmp")), ("PATH", self.path("bin") + ":" + os.environ["PATH"])):
+        for name, value in (("DISPLAY", ":7"), ("TMPDIR", self.path("tmp")), ("XDG_CACHE_HOME", self.path("cache")), ("PATH", self.path("bin") + ":" + os.environ["PATH"])):
             self.addCleanup(lambda n, v: os.environ.pop(n) if v is None else os.environ.__setitem__(n, v), name, os.environ.get(name))
             os.environ[name] = value
         self.assertIn("box.html", self.done("view", "box.glb"))
@@ -289,6 +291,21 @@ class View(CliTest):
         result = self.restage("view", "box.glb")
         self.assertEqual(result.code, 1)
         self.assertIn("no program opened the page", result.err)
+        # The opener may be the browser itself, which stays.
+        self.write("bin/xdg-open", '#!/bin/sh\necho $$ > "%s"\nexec sleep 60\n' % self.path("browser"))
+        begun = time.monotonic()
+        self.done("view", "box.glb")
+        self.assertLess(time.monotonic() - begun, 20)
+        os.kill(int(self.bytes("browser")), signal.SIGTERM)
+        # One page a file, of this day: none of the calls has left a folder.
+        self.assertEqual(os.listdir(self.path("tmp")), [])
+        pages = self.path("cache/restage/view")
+        self.assertEqual(os.listdir(pages), ["box.html"])
+        os.utime(os.path.join(pages, "box.html"), (1e9, 1e9))
+        self.write("bin/xdg-open", "#!/bin/sh\n")
+        os.rename(self.path("box.glb"), self.path("other.glb"))
+        self.done("view", "other.glb")
+        self.assertEqual(os.listdir(pages), ["other.html"])
 
     def test_any_bytes_end_kindly(self):
         """Whole files with wild numbers in them end with a picture or with one line, never with a crash."""
@@ -307,7 +324,7 @@ class RealCharacters(CliTest):
     def test_whole_and_close_up(self):
         hero = os.path.join(CHARACTERS, "mixa_t.glb")
         for look in ("head", "hands", "left-hand", "right-hand", "feet"):
-            self.done("view", hero, "--look", look, "--from", "front", "--size", "60x60", "--out", look + ".png")
+            self.done("view", hero, "--look", look, "--side", "front", "--size", "60x60", "--out", look + ".png")
             skin = [p for row in pixels(self.bytes(look + ".png")) for p in row if p[0] > 1.15 * p[2] + 8]
             self.assertGreater(len(skin), 60, look)
         self.done("retarget", "--source", os.path.join(CHARACTERS, "source_dance.glb"), "--target", hero, "--clip-name", "dance2", "--out", "x.glb")

@@ -50,17 +50,17 @@ class Weights(CliTest):
         self.ply("a.ply", points(300, 1))
         for name in ("lite", "standard"):
             shipped = os.path.join(ROOT, "experiments", "weights", name + ".safetensors")
-            found = self.json("skeleton", "--weights", shipped, "--input", "a.ply")["frames"]
+            found = self.json("skeleton", "--weights", shipped, "--source", "a.ply")["frames"]
             self.assertEqual(len(found[0]["joints"]), 22, name)
 
     def test_out_and_in_again(self):
         self.write("o.safetensors", tensors(OFFSETS))
-        self.done("weights", "import", "--from", "o.safetensors", "--model", "deformation/offsets", "--out", "w.safetensors")
+        self.done("weights", "import", "--source", "o.safetensors", "--model", "deformation/offsets", "--out", "w.safetensors")
         shown = self.json("weights", "show", "w.safetensors")
         self.assertEqual(shown["metadata"]["restage"]["models"]["deformation.offsets"]["model"], "deformation/offsets")
         self.assertEqual({t["name"]: t["shape"] for t in shown["tensors"]}, {"deformation.offsets." + k: v for k, v in OFFSETS.items()})
-        self.done("weights", "export", "--from", "w.safetensors", "--model", "deformation/offsets", "--out", "back.safetensors")
-        self.done("weights", "import", "--from", "back.safetensors", "--model", "deformation/offsets", "--out", "again.safetensors")
+        self.done("weights", "export", "--source", "w.safetensors", "--model", "deformation/offsets", "--out", "back.safetensors")
+        self.done("weights", "import", "--source", "back.safetensors", "--model", "deformation/offsets", "--out", "again.safetensors")
         self.assertEqual(self.bytes("w.safetensors"), self.bytes("again.safetensors"))
         self.assertIn("fc2.weight", self.done("weights", "show", "back.safetensors"))
 
@@ -68,11 +68,11 @@ class Weights(CliTest):
         self.write("o.safetensors", tensors(OFFSETS))
         self.write("foreign.safetensors", tensors(dict(OFFSETS, step=[1]), 1, "net/"))
         self.write("names.yaml", "net/step: ~\n'net/*': '*'\n")
-        self.done("weights", "import", "--from", "o.safetensors", "--model", "deformation/offsets", "--out", "w.safetensors")
+        self.done("weights", "import", "--source", "o.safetensors", "--model", "deformation/offsets", "--out", "w.safetensors")
         wide = dict(OFFSETS, **{"fc3.weight": [22, 256], "fc3.bias": [22]})
         self.write("w_net.safetensors", tensors(wide, 2))
-        self.done("weights", "import", "--from", "w_net.safetensors", "--model", "deformation/weights", "--with", "w.safetensors", "--out", "w.safetensors")
-        self.done("weights", "import", "--from", "foreign.safetensors", "--map", "names.yaml", "--model", "deformation/offsets",
+        self.done("weights", "import", "--source", "w_net.safetensors", "--model", "deformation/weights", "--with", "w.safetensors", "--out", "w.safetensors")
+        self.done("weights", "import", "--source", "foreign.safetensors", "--map", "names.yaml", "--model", "deformation/offsets",
                   "--with", "w.safetensors", "--out", "w.safetensors")
         self.assertEqual(len(self.json("weights", "show", "w.safetensors")["tensors"]), 12)
 
@@ -80,7 +80,7 @@ class Weights(CliTest):
         shapes = dict(OFFSETS, **{"fc1.weight": [256, 68], "else": [2]})
         del shapes["fc2.bias"], shapes["fc3.bias"]
         self.write("o.safetensors", tensors(shapes))
-        arguments = ["weights", "import", "--from", "o.safetensors", "--model", "deformation/offsets", "--out", "w.safetensors"]
+        arguments = ["weights", "import", "--source", "o.safetensors", "--model", "deformation/offsets", "--out", "w.safetensors"]
         result = self.restage(*arguments)
         self.one_line(result, 2, "o.safetensors", "2 missing", "1 unexpected", "1 unfit")
         for name in ("fc2.bias", "fc3.bias", "else", "fc1.weight: [256, 68] instead of [256, 69]"):
@@ -95,16 +95,16 @@ class Weights(CliTest):
         into = ["--model", "deformation/offsets", "--out", "w.safetensors"]
         self.bad_input(["weights", "show", "none.safetensors"], "none.safetensors")
         self.bad_input(["weights", "show", cut], cut)
-        self.bad_input(["weights", "import", "--from", cut, *into], cut)
-        self.bad_input(["weights", "import", "--from", good, "--model", "deformation/offset", "--out", "w.safetensors"], "deformation/offsets")
-        self.bad_input(["weights", "import", "--from", good, "--map", self.write("m.yaml", "[1]"), *into], "m.yaml")
-        self.bad_input(["weights", "import", "--from", good, "--size", "widht=3", *into], "did you mean 'width'")
+        self.bad_input(["weights", "import", "--source", cut, *into], cut)
+        self.bad_input(["weights", "import", "--source", good, "--model", "deformation/offset", "--out", "w.safetensors"], "deformation/offsets")
+        self.bad_input(["weights", "import", "--source", good, "--map", self.write("m.yaml", "[1]"), *into], "m.yaml")
+        self.bad_input(["weights", "import", "--source", good, "--size", "widht=3", *into], "did you mean 'width'")
         for value in (-5, 0):
-            self.bad_input(["weights", "import", "--from", good, "--size=width=%d" % value, *into], "width", "from 1 to")
-        self.bad_input(["weights", "export", "--from", good, "--model", "smrm", "--out", "s.safetensors"], good)
-        self.bad_input(["weights", "import", "--from", good, "--model", "deformation/offsets", "--out", "nowhere/w.safetensors"], "nowhere")
+            self.bad_input(["weights", "import", "--source", good, "--size=width=%d" % value, *into], "width", "from 1 to")
+        self.bad_input(["weights", "export", "--source", good, "--model", "smrm", "--out", "s.safetensors"], good)
+        self.bad_input(["weights", "import", "--source", good, "--model", "deformation/offsets", "--out", "nowhere/w.safetensors"], "nowhere")
 
     def test_full_disk(self):
         self.write("o.safetensors", tensors(OFFSETS))
-        result = self.restage("weights", "import", "--from", "o.safetensors", "--model", "deformation/offsets", "--out", "w.safetensors", before=small_disk)
+        result = self.restage("weights", "import", "--source", "o.safetensors", "--model", "deformation/offsets", "--out", "w.safetensors", before=small_disk)
         self.one_line(result, 1, "w.safetensors")

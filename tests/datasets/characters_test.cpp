@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "datasets/characters/gltf_clip.h"
-#include "datasets/importers/gltf_character.h"
+#include "datasets/importers/rigs/gltf_character.h"
 #include "tests/datasets/gltf_maker.h"
 #include "tests/datasets/importers_support.h"
 

@@ -6,8 +6,8 @@
 
 #include "autograd/base/error.h"
 #include "datasets/doctor/examine.h"
-#include "datasets/readers/mesh_io.h"
-#include "datasets/readers/precision.h"
+#include "datasets/readers/clouds/mesh_io.h"
+#include "datasets/readers/clouds/precision.h"
 #include "tests/support/doctor_people.h"
 #include "tests/support/errors.h"
 #include "tests/support/files.h"
@@ -34,7 +34,7 @@ TEST(DoctorSequence, AxesAndUnitsOfASequence) {
   EXPECT_FALSE(d.usable());
   EXPECT_TRUE(notes(d, "up", "+z is up"));
   EXPECT_TRUE(notes(d, "units", "1 cm"));
-  EXPECT_NE(d.find("units")->fix.find("--scale 0.01"), std::string::npos);
+  EXPECT_NE(d.find("units")->fix.find("scale 0.01"), std::string::npos);
 }
 
 TEST(DoctorSequence, RepeatedFramesInAnyOrderOfPoints) {
@@ -172,7 +172,7 @@ TEST(DoctorSequence, NobodyIsTurnedOnAGuess) {
     ++unsure;
     EXPECT_GT(d.transform->rotation(1, 1), 0.99) << degrees;
     EXPECT_HAS(up->what, "may be up, not +y");
-    EXPECT_HAS(up->fix, "--up=");
+    EXPECT_HAS(up->fix, "up=");
   }
   EXPECT_GT(unsure, 0);
 }
@@ -207,16 +207,16 @@ TEST(DoctorChecks, RefuseNonsenseWithTheOptionThatMendsIt) {
     return test::refusal_of([&] { check_source(frames, "scans", given); });
   };
   // What was given already counts: metres read as centimetres, y up read as z up.
-  EXPECT_HAS(source(Mat3::Identity(), 0.01, {0.01, "y"}), "leave --scale out");
-  EXPECT_HAS(source(Mat3::Identity(), 10, {0.1, "y"}), "--scale 0.01");
+  EXPECT_HAS(source(Mat3::Identity(), 0.01, {0.01, "y"}), "leave scale out");
+  EXPECT_HAS(source(Mat3::Identity(), 10, {0.1, "y"}), "scale 0.01");
   EXPECT_EQ(source(into_foreign(5, 2), 1, {1, "z", true}), "") << "who says so is believed";
   EXPECT_EQ(source(into_foreign(4, 1), 1, {1, "y", true}), "");
-  EXPECT_HAS(source(Mat3::Identity(), 3e4), "--scale");
+  EXPECT_HAS(source(Mat3::Identity(), 3e4), "scale");
   EXPECT_EQ(source(Mat3::Identity(), 1), "");
-  EXPECT_HAS(source(into_foreign(4, 1), 1), "--source-up z");
-  EXPECT_HAS(source(into_foreign(0, 4), 1), "--source-up x");
-  EXPECT_HAS(source(into_foreign(3, 4), 1), "--source-up -y");
-  EXPECT_HAS(source(Mat3::Identity(), 100), "--scale 0.01");
+  EXPECT_HAS(source(into_foreign(4, 1), 1), "source_up z");
+  EXPECT_HAS(source(into_foreign(0, 4), 1), "source_up x");
+  EXPECT_HAS(source(into_foreign(3, 4), 1), "source_up -y");
+  EXPECT_HAS(source(Mat3::Identity(), 100), "scale 0.01");
   const auto target = [&](const Mat3& turn, double scale) {
     return test::refusal_of(
         [&] { check_target(cloud(moved(scan(somebody()), turn, scale)), "hero"); });
@@ -225,6 +225,49 @@ TEST(DoctorChecks, RefuseNonsenseWithTheOptionThatMendsIt) {
   EXPECT_HAS(target(into_foreign(4, 1), 1), "+z");
   EXPECT_HAS(target(into_foreign(2, 5), 1), "faces -z");
   EXPECT_HAS(target(Mat3::Identity(), 1000), "1 mm");
+}
+
+/// On the floor, the head along z.
+Points lying(const Points& standing) {
+  Points out = moved(standing, into_foreign(4, 1), 1);
+  float lowest = out[0].y();
+  for (const Point& p : out) lowest = std::min(lowest, p.y());
+  for (Point& p : out) p.y() -= lowest;
+  return out;
+}
+
+TEST(DoctorChecks, WhoLiesFirstAndStandsUpLaterIsTakenAsGiven) {
+  std::vector<Points> take = performance(40);
+  for (size_t f = 0; f < 28; ++f) take[f] = lying(take[f]);
+  const auto refusal = [](const std::vector<Points>& clouds, bool all) {
+    std::vector<Mesh> first;
+    for (size_t f = 0; f < kSourceFrames; ++f) first.push_back(cloud(clouds[f]));
+    const TakeClouds whole = [&] { return clouds; };
+    return test::refusal_of([&] { check_source(first, "scans", {}, all ? whole : TakeClouds()); });
+  };
+  EXPECT_HAS(refusal(take, false), "up");
+  EXPECT_EQ(refusal(take, true), "");
+  EXPECT_EQ(up_of_take(take, 2), 2);
+  // In a file whose z is up the same person does not stand along y, though they lie along it.
+  std::vector<Points> foreign;
+  for (const Points& p : take) foreign.push_back(moved(p, into_foreign(4, 1), 1));
+  EXPECT_EQ(up_of_take(foreign, 2), 4);
+  EXPECT_HAS(refusal(foreign, true), "source_up z");
+  // On the hands all the time: nothing tells it from somebody upright in another frame.
+  std::vector<Points> hands;
+  for (const Points& p : performance(40))
+    hands.push_back(moved(p, Eigen::AngleAxisd(M_PI, Vec3::UnitX()).matrix(), 1));
+  EXPECT_HAS(refusal(hands, true), "-y");
+  // Who stands along y now and then, but over no floor: swinging from a bar, in a file with z up.
+  std::vector<Points> swinging = performance(40);
+  for (size_t f = 0; f < 40; ++f) {
+    if (f < 24) swinging[f] = moved(swinging[f], into_foreign(4, 1), 1);
+    for (Point& p : swinging[f]) p += 0.1f * static_cast<float>(f % 8) * Point(0, 1, 0);
+  }
+  EXPECT_HAS(refusal(swinging, true), "source_up z");
+  // Nobody stands: both readings are told, and nothing is taken.
+  for (Points& p : take) p = lying(performance(1)[0]);
+  EXPECT_HAS(refusal(take, true), "where people lie");
 }
 
 TEST(DoctorChecks, GoodInputIsNeverRefused) {

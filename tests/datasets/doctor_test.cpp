@@ -266,7 +266,7 @@ TEST(Doctor, NobodyIsOfThatSize) {
   for (const double scale : {0.31, 0.55, 1.0, 1.7}) EXPECT_TRUE(judged(scale).usable()) << scale;
   EXPECT_TRUE(judged(100, 0.01).usable());
   EXPECT_FALSE(judged(100, 1).usable());
-  EXPECT_NE(judged(100, 1).find("units")->fix.find("--scale 0.01"), std::string::npos);
+  EXPECT_NE(judged(100, 1).find("units")->fix.find("scale 0.01"), std::string::npos);
 }
 
 /// The same target, the same answer: what the doctor calls wrong is refused, nothing else.

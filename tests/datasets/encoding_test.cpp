@@ -1,5 +1,5 @@
 // In which encoding names are: written out in bytes, as files have them.
-#include "datasets/readers/encoding.h"
+#include "datasets/readers/text/encoding.h"
 
 #include <gtest/gtest.h>
 

@@ -11,9 +11,9 @@
 #include "datasets/fetch/fetch.h"
 #include "datasets/fetch/fetch_cmu.h"
 #include "datasets/hdf5/file.h"
-#include "datasets/importers/cmu.h"
-#include "datasets/importers/cmu_pack.h"
-#include "datasets/importers/makehuman_pack.h"
+#include "datasets/importers/bodies/makehuman_pack.h"
+#include "datasets/importers/motions/cmu.h"
+#include "datasets/importers/motions/cmu_pack.h"
 #include "datasets/readers/sha256.h"
 #include "tests/datasets/npz_support.h"
 #include "tests/support/data_folder.h"
@@ -192,7 +192,7 @@ TEST_F(Fetch, WhatIsNotPinnedNeverTakesItsPlace) {
                fetch_data(list(line(big_, "big.bin", "file://" + dir.path() + "/none")),
                           dir / "out");
              }),
-             "--from FOLDER");
+             "source FOLDER");
   EXPECT_THROW(fetch_data(list(line(big_, "a", "http://localhost:1/x")), dir / "out"), InputError)
       << "unencrypted";
 }

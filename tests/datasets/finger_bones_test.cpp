@@ -1,5 +1,5 @@
 // Fingers by the names that programs give them.
-#include "datasets/importers/finger_bones.h"
+#include "datasets/importers/rigs/finger_bones.h"
 
 #include <gtest/gtest.h>
 

@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <filesystem>
 
-#include "datasets/importers/amass.h"
 #include "datasets/importers/import.h"
+#include "datasets/importers/motions/amass.h"
 #include "datasets/schema.h"
 #include "tests/datasets/importers_support.h"
 #include "tests/datasets/smpl_support.h"
@@ -105,7 +105,7 @@ TEST_F(ImportersAmass, OptionsOverrideAndDoubtsAreRemarked) {
   other.fps = 30;
   EXPECT_EQ(import_amass(file, models, other, report).frames(), 121u);
   EXPECT_HAS(fact(report, "body model"), "4 of 16 betas");
-  EXPECT_HAS(fact(report, "up"), "--up");
+  EXPECT_HAS(fact(report, "up"), "(up)");
   ASSERT_EQ(report.remarks.size(), 2u);
   EXPECT_HAS(report.remarks[0], "fitted with a female body");
   EXPECT_HAS(report.remarks[1], "not upright");
@@ -128,7 +128,7 @@ TEST_F(ImportersAmass, TheModelIsFoundByFamilyAndGender) {
   EXPECT_HAS(error_of([&] { models.find(SmplFamily::smplh, "neutral", "c", remarks); }),
              "neutral body, whose model");
   BodyModels one(dir / "models/smplx/SMPLX_NEUTRAL.npz");
-  EXPECT_HAS(error_of([&] { one.find(SmplFamily::smplh, "male", "c", remarks); }), "--body-model");
+  EXPECT_HAS(error_of([&] { one.find(SmplFamily::smplh, "male", "c", remarks); }), "body_model");
   BodyModels stand_in(dir.write("plain.npz", TinySmpl{SmplFamily::smpl}.file()));
   EXPECT_EQ(stand_in.find(SmplFamily::smplh, "male", "c", remarks).family(), SmplFamily::smpl);
   EXPECT_EQ(remarks.size(), 1u);
@@ -145,7 +145,7 @@ TEST_F(ImportersAmass, WhatIsWrongIsSaid) {
     ImportReport report;
     return error_of([&] { import_amass(Npz(dir / "c.npz"), models, {}, report); });
   };
-  const WrongArray wrong[] = {{"mocap_framerate", "", "--fps"},
+  const WrongArray wrong[] = {{"mocap_framerate", "", "with fps"},
                               {"mocap_framerate", npy<double>({}, {0}), "no frame rate"},
                               {"mocap_framerate", npy_text("fast"), "no frame rate"},
                               {"poses", doubles({121, 69}, 0), "[121, 69]"},
@@ -314,7 +314,7 @@ TEST_F(ImportersAmass, TheRootTellsWhichAxisIsUp) {
     given.rest.up = Axis::z;
     ImportReport overruled;
     import_amass(Npz(dir / "a.npz"), models, given, overruled);
-    EXPECT_HAS(fact(overruled, "up"), "z (--up)");
+    EXPECT_HAS(fact(overruled, "up"), "z (up)");
   }
 }
 
@@ -339,7 +339,7 @@ TEST_F(ImportersAmass, WhoLiesOnTheFloorKeepsZUp) {
     ImportReport found;
     import_amass(Npz(dir.write("b.npz", npz(lies))), models, {}, found);
     EXPECT_EQ(fact(found, "up"), "z (AMASS), turned to y");
-    EXPECT_HAS(remarks(found), "--up y");
+    EXPECT_HAS(remarks(found), "up y");
   }
 }
 
@@ -363,16 +363,15 @@ TEST_F(ImportersAmass, APathThatIsNotInMetresIsSaid) {
     return import_amass(Npz(dir.write("a.npz", npz(arrays))), models, options, report);
   };
   const Motion wanted = import(with_path(clip, 1, standing));
-  const std::pair<double, const char*> units[] = {
-      {100, "give --scale 0.01 if they are centimetres"},
-      {1000, "give --scale 0.001 if they are milli"}};
+  const std::pair<double, const char*> units[] = {{100, "give scale 0.01 if they are centimetres"},
+                                                  {1000, "give scale 0.001 if they are milli"}};
   for (const auto& [unit, says] : units) {
     const Arrays arrays = with_path(clip, unit, standing);
     EXPECT_HAS(error_of([&] { import(arrays); }), says);
     MotionOptions options;
     options.scale = 1 / unit;
     const Motion motion = import(arrays, options);
-    EXPECT_HAS(fact(report, "scale of trans"), "--scale");
+    EXPECT_HAS(fact(report, "scale of trans"), "(scale)");
     for (size_t f = 0; f < wanted.frames(); ++f)
       EXPECT_LT(
           (testing::motion_joints(motion, f)[0] - testing::motion_joints(wanted, f)[0]).norm(),
@@ -491,7 +490,7 @@ TEST_F(ImportersAmass, ATreeOfClipsNamesSubjectsAndListsWhatIsUnusable) {
   dir.write("tree/notes/other.npz", npz({{"x", npy<double>({1}, {1})}}));
   dir.write("tree/notes/readme.txt", "hello");
   ImportOptions options;
-  EXPECT_HAS(error_of([&] { import_data(dir / "tree", dir / "o.h5", options); }), "--body-model");
+  EXPECT_HAS(error_of([&] { import_data(dir / "tree", dir / "o.h5", options); }), "body_model");
   options.body_model = dir.write("model.npz", TinySmpl().file());
   options.motion.split = "validation";
   options.license = "AMASS";
@@ -514,7 +513,7 @@ TEST_F(ImportersAmass, ATreeOfClipsNamesSubjectsAndListsWhatIsUnusable) {
   import_data(dir / "tree/CMU/07/07_2_poses.npz", dir / "p.h5", options);
   EXPECT_EQ(read_motions(dir / "p.h5")[0].subject, "07");
   EXPECT_HAS(error_of([&] { import_data(dir / "tree/CMU/07/shape.npz", dir / "q.h5", options); }),
-             "--betas");
+             "betas");
   EXPECT_FALSE(std::filesystem::exists(dir / "q.h5"));
 }
 

@@ -1,8 +1,8 @@
 // What --bones FILE names must hang together as a person does (check_asked()).
 #include <gtest/gtest.h>
 
-#include "datasets/importers/profiles.h"
-#include "datasets/importers/source_motion.h"
+#include "datasets/importers/motions/source_motion.h"
+#include "datasets/importers/rigs/profiles.h"
 #include "tests/datasets/rig_lists_games.h"
 #include "tests/datasets/rig_lists_studios.h"
 #include "tests/support/errors.h"
@@ -61,7 +61,7 @@ TEST(ImportersAsked, SidesCrossedWithinALimbAreRefused) {
         if (rig.bone[j] < 0) continue;
         const std::string says = asked_says(rig.skeleton, crossed_at(rig.bone, j));
         EXPECT_HAS(says, ", hangs on the bone for ") << list.name << " " << kJointNames[j];
-        EXPECT_HAS(says, "correct the names in the file of --bones");
+        EXPECT_HAS(says, "correct the names in the file of bones");
         ++tried;
       }
     }

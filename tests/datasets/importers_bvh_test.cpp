@@ -5,8 +5,8 @@
 
 #include <cmath>
 
-#include "datasets/importers/bvh.h"
-#include "datasets/readers/bvh.h"
+#include "datasets/importers/motions/bvh.h"
+#include "datasets/readers/skeletons/bvh.h"
 #include "tests/datasets/importers_bvh_text.h"
 #include "tests/datasets/importers_support.h"
 #include "tests/datasets/npz_support.h"
@@ -280,7 +280,7 @@ TEST_F(ReadersRecordings, AFrameTimeThatIsNoneNeedsTheRate) {
   const size_t at = text.find("Frame Time:"), end = text.find('\n', at);
   for (const char* time : {"0", "0.000000", "-1", "1e9"}) {
     text.replace(at, text.find('\n', at) - at, std::string("Frame Time: ") + time);
-    EXPECT_HAS(refusal_of([&] { convert_bvh(text, "x.bvh"); }), "give the true rate with --fps");
+    EXPECT_HAS(refusal_of([&] { convert_bvh(text, "x.bvh"); }), "give the true rate with fps");
     MotionOptions told;
     told.fps = 30;
     const MotionClip clip = convert_bvh(text, "x.bvh", told);

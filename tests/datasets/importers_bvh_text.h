@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "datasets/importers/profiles.h"
+#include "datasets/importers/rigs/profiles.h"
 #include "nn/geometry/skeleton.h"
 
 namespace restage::bvh_test {

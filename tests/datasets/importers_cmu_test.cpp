@@ -9,10 +9,10 @@
 #include <map>
 
 #include "datasets/hdf5/file.h"
-#include "datasets/importers/amc.h"
-#include "datasets/importers/bvh.h"
-#include "datasets/importers/cmu.h"
-#include "datasets/readers/asf.h"
+#include "datasets/importers/motions/amc.h"
+#include "datasets/importers/motions/bvh.h"
+#include "datasets/importers/motions/cmu.h"
+#include "datasets/readers/skeletons/asf.h"
 #include "tests/datasets/importers_support.h"
 #include "tests/support/data_folder.h"
 #include "tests/support/files.h"

@@ -2,10 +2,10 @@
 // in degrees and millimetres; our own output comes back in.
 #include <gtest/gtest.h>
 
-#include "datasets/importers/gltf_character.h"
 #include "datasets/importers/import.h"
-#include "datasets/readers/frame_folder.h"
-#include "datasets/readers/mesh_io.h"
+#include "datasets/importers/rigs/gltf_character.h"
+#include "datasets/readers/clouds/mesh_io.h"
+#include "datasets/readers/frames/frame_folder.h"
 #include "datasets/schema.h"
 #include "infer/writers/glb.h"
 #include "tests/datasets/gltf_maker.h"
@@ -196,8 +196,8 @@ TEST_F(ImportersGltf, AnIncompleteVrmListIsNamed) {
   const std::string one = refused({"leftHand"});
   EXPECT_HAS(one, "VRM's list of bones (humanBones) lacks leftHand (the left_wrist)");
   EXPECT_HAS(one, "in the program that exports VRM");
-  EXPECT_HAS(one, "--bones names.yaml");
-  EXPECT_EQ(one.find("leave --bones out"), std::string::npos) << one;
+  EXPECT_HAS(one, "bones names.yaml");
+  EXPECT_EQ(one.find("leave bones out"), std::string::npos) << one;
   EXPECT_HAS(refused({"head", "rightUpperLeg"}),
              "lacks rightUpperLeg (the right_hip), head (the head)");
 }
@@ -253,7 +253,7 @@ TEST_F(ImportersGltf, BonesOfATargetMayBeNamed) {
   ASSERT_TRUE(found.joints);
   EXPECT_HAS(read_target(file).unknown_rig, "none of its");
   write_ply(dir / "hero.ply", known_.body.rest);
-  EXPECT_HAS(error_of([&] { read_target(dir / "hero.ply", "mixamo"); }), "leave --bones out");
+  EXPECT_HAS(error_of([&] { read_target(dir / "hero.ply", "mixamo"); }), "leave bones out");
 }
 
 TEST_F(ImportersGltf, NodesThatRestInAnAnimationDoNotMatter) {

@@ -9,7 +9,7 @@
 #include "datasets/importers/import.h"
 #include "datasets/importers/import_detail.h"
 #include "datasets/importers/scans.h"
-#include "datasets/readers/mesh_io.h"
+#include "datasets/readers/clouds/mesh_io.h"
 #include "datasets/schema.h"
 #include "tests/datasets/importers_bvh_text.h"
 #include "tests/datasets/importers_support.h"
@@ -94,7 +94,7 @@ TEST_F(ImportersImport, OfAFileAllGoesInOrNothing) {
 TEST_F(ImportersImport, OptionsAreJudgedBeforeFiles) {
   ImportOptions options;
   options.motion.split = "nope";
-  EXPECT_HAS(error_of([&] { import_data("no such file", out(), options); }), "--split 'nope'");
+  EXPECT_HAS(error_of([&] { import_data("no such file", out(), options); }), "split 'nope'");
 }
 
 TEST_F(ImportersImport, NothingIsLeftBehindByAFailure) {
@@ -157,10 +157,10 @@ TEST_F(ImportersScans, TheNearestFrameInTimeIsTakenAndReported) {
   };
   const auto [same, same_text] = import(4, 0);
   EXPECT_EQ(same, (std::vector<int>{0, 1, 2, 3}));
-  EXPECT_HAS(same_text, "30 fps (taken for granted: --fps), 4 frames, kept");
+  EXPECT_HAS(same_text, "30 fps (taken for granted: fps), 4 frames, kept");
   const auto [half, half_text] = import(7, 60);
   EXPECT_EQ(half, (std::vector<int>{0, 2, 4, 6}));
-  EXPECT_HAS(half_text, "60 fps (--fps), 7 frames -> 30 fps, 4 frames");
+  EXPECT_HAS(half_text, "60 fps (fps), 7 frames -> 30 fps, 4 frames");
   EXPECT_HAS(half_text, "3 left out, 0 repeated");
   const auto [twice, twice_text] = import(3, 15);
   EXPECT_EQ(twice, (std::vector<int>{0, 0, 1, 1, 2}));
@@ -183,13 +183,13 @@ TEST_F(ImportersScans, UnitsAxesAndTheFilesOwnRate) {
   EXPECT_LT((read_scans(dir / "s.h5").points[0] - Point(1, 3, -2)).norm(), 1e-6f);
   EXPECT_EQ(inspect(dir / "s.h5").license, "mine");
   EXPECT_HAS(fact(summary.reports[0], "rate"), "60 fps (the file's)");
-  EXPECT_HAS(fact(summary.reports[0], "scale"), "0.001 m a unit (--scale)");
-  EXPECT_HAS(fact(summary.reports[0], "up"), "z (--up)");
+  EXPECT_HAS(fact(summary.reports[0], "scale"), "0.001 m a unit (scale)");
+  EXPECT_HAS(fact(summary.reports[0], "up"), "z (up)");
   options.motion.scale = 1e38;
-  EXPECT_HAS(error_of([&] { import_data(dir / "s.npz", dir / "t.h5", options); }), "--scale");
+  EXPECT_HAS(error_of([&] { import_data(dir / "s.npz", dir / "t.h5", options); }), "scale");
   options.motion.scale = 1;
   options.motion.fps = 1e-9;
-  EXPECT_HAS(error_of([&] { import_data(dir / "s.npz", dir / "t.h5", options); }), "--fps");
+  EXPECT_HAS(error_of([&] { import_data(dir / "s.npz", dir / "t.h5", options); }), "fps");
   EXPECT_FALSE(fs::exists(dir / "t.h5"));
 }
 
@@ -338,8 +338,8 @@ TEST_F(ImportersScans, PathsOfOnePointAreNoScans) {
 }
 
 TEST_F(ImportersScans, AnotherUnitThanMetresIsNotTakenForMetres) {
-  const std::pair<float, const char*> units[] = {{100, "give --scale 0.01,"},
-                                                 {1000, "give --scale 0.001,"}};
+  const std::pair<float, const char*> units[] = {{100, "give scale 0.01,"},
+                                                 {1000, "give scale 0.001,"}};
   for (const auto& [unit, says] : units) {
     const Points points = person({0, 0, 0}, unit);
     const std::string file = dir.write("a.npy", npy<float>({80, 3}, flat(points)));

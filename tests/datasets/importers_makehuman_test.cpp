@@ -8,8 +8,8 @@
 #include <set>
 
 #include "datasets/hdf5/file.h"
-#include "datasets/importers/gltf_character.h"
-#include "datasets/importers/makehuman.h"
+#include "datasets/importers/bodies/makehuman.h"
+#include "datasets/importers/rigs/gltf_character.h"
 #include "tests/datasets/gltf_maker.h"
 #include "tests/support/data_folder.h"
 #include "tests/support/files.h"

@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <filesystem>
 
-#include "datasets/importers/amass.h"
 #include "datasets/importers/import.h"
+#include "datasets/importers/motions/amass.h"
 #include "datasets/schema.h"
 #include "tests/datasets/importers_support.h"
 #include "tests/datasets/smpl_support.h"
@@ -189,7 +189,7 @@ TEST_F(ImportersSmpl, ImportGivesBodies) {
   EXPECT_EQ(bodies[3].rest.vertices, bodies[0].rest.vertices);  // betas beyond the model's
   options.betas = {model};
   EXPECT_HAS(error_of([&] { import_data(model, dir / "p.h5", options); }), "'betas'");
-  EXPECT_HAS(error_of([&] { import_data(dir / "ann.npz", dir / "p.h5", options); }), "--betas");
+  EXPECT_HAS(error_of([&] { import_data(dir / "ann.npz", dir / "p.h5", options); }), "betas");
 }
 
 }  // namespace

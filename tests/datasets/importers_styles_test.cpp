@@ -7,8 +7,8 @@
 #include <cmath>
 #include <set>
 
-#include "datasets/importers/bvh.h"
-#include "datasets/importers/source_motion.h"
+#include "datasets/importers/motions/bvh.h"
+#include "datasets/importers/motions/source_motion.h"
 #include "tests/datasets/importers_bvh_text.h"
 #include "tests/datasets/importers_support.h"
 
@@ -226,7 +226,7 @@ TEST(ImportersStyles, AnyAxisMayBeUp) {
     text.insert(at + 1, "180 0 0 ");
   const MotionClip clip = convert_bvh(text, "a.bvh");
   EXPECT_EQ(fact(clip.report, "up"), "y, by the rest pose");
-  EXPECT_HAS(remarks(clip.report), "--up -y");
+  EXPECT_HAS(remarks(clip.report), "up -y");
 }
 
 // ---- profiles of bone names

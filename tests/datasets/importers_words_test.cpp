@@ -1,7 +1,7 @@
 // What the name of a bone says: its words, in all languages, without decoration.
 #include <gtest/gtest.h>
 
-#include "datasets/importers/bone_words.h"
+#include "datasets/importers/rigs/bone_words.h"
 
 namespace restage {
 namespace {

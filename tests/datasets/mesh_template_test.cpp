@@ -5,7 +5,7 @@
 
 #include <cstring>
 
-#include "datasets/readers/mesh_io.h"
+#include "datasets/readers/clouds/mesh_io.h"
 #include "tests/support/files.h"
 
 namespace restage {

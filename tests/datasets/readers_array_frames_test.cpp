@@ -4,7 +4,7 @@
 #include <cmath>
 #include <functional>
 
-#include "datasets/readers/array_frames.h"
+#include "datasets/readers/frames/array_frames.h"
 #include "tests/datasets/npz_support.h"
 #include "tests/support/files.h"
 

@@ -6,8 +6,8 @@
 #include <cmath>
 #include <limits>
 
-#include "datasets/readers/array_frames.h"
-#include "datasets/readers/npz.h"
+#include "datasets/readers/arrays/npz.h"
+#include "datasets/readers/frames/array_frames.h"
 #include "tests/datasets/npz_support.h"
 #include "tests/support/files.h"
 
@@ -154,7 +154,7 @@ TEST_F(ReadersArrays, LengthsAreNeverBelieved) {
       {npy_as("<f8", {int64_t{1} << 43}, "12345678"), "should hold"},
       {endless, "cut short"}};
   for (const auto& [bytes, says] : cases) EXPECT_HAS(refusal(bytes), says);
-  EXPECT_HAS(error_of([&] { array_of(npy<double>({4}, {1, 2, 3, 4}), 31); }), "--max-memory");
+  EXPECT_HAS(error_of([&] { array_of(npy<double>({4}, {1, 2, 3, 4}), 31); }), "max_memory");
 }
 
 // ---- NPZ ---------------------------------------------------------------------------------------
@@ -281,7 +281,7 @@ TEST_F(ReadersArrays, BombsStopAtTheMemoryLimit) {
   write_bytes(dir / "a.npz", npz({{"a", bomb}, {"b", counting(3)}}));
   EXPECT_LT(std::filesystem::file_size(dir / "a.npz"), 30000u);
   const Npz file(dir / "a.npz", 10 << 20);
-  EXPECT_HAS(error_of([&] { file.array("a"); }), "--max-memory");
+  EXPECT_HAS(error_of([&] { file.array("a"); }), "max_memory");
   EXPECT_EQ(file.array("b").size(), 3);
   EXPECT_EQ(Npz(dir / "a.npz", 30 << 20).array("a").size(), n);
 }

@@ -4,9 +4,9 @@
 #include <algorithm>
 
 #include "datasets/hdf5/file.h"
-#include "datasets/readers/frame_folder.h"
-#include "datasets/readers/hdf5_frames.h"
-#include "datasets/readers/mesh_io.h"
+#include "datasets/readers/clouds/mesh_io.h"
+#include "datasets/readers/frames/frame_folder.h"
+#include "datasets/readers/frames/hdf5_frames.h"
 #include "tests/datasets/npz_support.h"
 #include "tests/support/files.h"
 

@@ -3,7 +3,7 @@
 
 #include "datasets/importers/import.h"
 #include "datasets/readers/foreign_kinds.h"
-#include "datasets/readers/frame_folder.h"
+#include "datasets/readers/frames/frame_folder.h"
 #include "tests/support/files.h"
 
 namespace restage {

@@ -1,8 +1,8 @@
 // Tables that hold several frames, one below the other, or a column that is no coordinate.
 #include <gtest/gtest.h>
 
+#include "datasets/readers/clouds/mesh_io.h"
 #include "datasets/readers/errors.h"
-#include "datasets/readers/mesh_io.h"
 #include "tests/support/files.h"
 
 namespace restage {

@@ -5,7 +5,7 @@
 
 #include "autograd/base/error.h"
 #include "datasets/readers/errors.h"
-#include "datasets/readers/frame_folder.h"
+#include "datasets/readers/frames/frame_folder.h"
 #include "tests/support/files.h"
 
 namespace restage {

@@ -1,9 +1,9 @@
 // The glTF reader: types of numbers, interpolation, and files that are wrong in every way.
 #include <gtest/gtest.h>
 
-#include "datasets/importers/gltf_character.h"
-#include "datasets/readers/gltf.h"
-#include "datasets/readers/mesh_io.h"
+#include "datasets/importers/rigs/gltf_character.h"
+#include "datasets/readers/clouds/mesh_io.h"
+#include "datasets/readers/gltf/gltf.h"
 #include "tests/datasets/gltf_maker.h"
 #include "tests/support/files.h"
 

@@ -2,7 +2,7 @@
 // read_gltf().
 #include <gtest/gtest.h>
 
-#include "datasets/readers/gltf_look.h"
+#include "datasets/readers/gltf/gltf_look.h"
 #include "tests/datasets/gltf_maker.h"
 #include "tests/support/files.h"
 

@@ -4,7 +4,7 @@
 #include <algorithm>
 
 #include "autograd/base/error.h"
-#include "datasets/readers/frame_names.h"
+#include "datasets/readers/frames/frame_names.h"
 #include "tests/support/files.h"
 
 namespace restage {

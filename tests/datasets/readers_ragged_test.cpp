@@ -4,10 +4,10 @@
 #include <cmath>
 
 #include "datasets/hdf5/file.h"
-#include "datasets/readers/array_frames.h"
+#include "datasets/readers/clouds/point_path.h"
 #include "datasets/readers/errors.h"
-#include "datasets/readers/frame_folder.h"
-#include "datasets/readers/point_path.h"
+#include "datasets/readers/frames/array_frames.h"
+#include "datasets/readers/frames/frame_folder.h"
 #include "tests/datasets/npz_support.h"
 #include "tests/support/files.h"
 

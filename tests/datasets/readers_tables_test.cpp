@@ -1,8 +1,8 @@
 // Tables of points as programs for molecules, faces and statistics write them.
 #include <gtest/gtest.h>
 
-#include "datasets/readers/frame_folder.h"
-#include "datasets/readers/mesh_io.h"
+#include "datasets/readers/clouds/mesh_io.h"
+#include "datasets/readers/frames/frame_folder.h"
 #include "tests/support/files.h"
 
 namespace restage {

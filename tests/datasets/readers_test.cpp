@@ -5,9 +5,9 @@
 #include <cstring>
 #include <limits>
 
-#include "datasets/readers/frame_folder.h"
-#include "datasets/readers/mesh_io.h"
-#include "datasets/readers/text.h"
+#include "datasets/readers/clouds/mesh_io.h"
+#include "datasets/readers/frames/frame_folder.h"
+#include "datasets/readers/text/text.h"
 #include "datasets/schema.h"
 #include "tests/datasets/npz_support.h"
 #include "tests/support/files.h"

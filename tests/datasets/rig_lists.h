@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "datasets/readers/skeleton_file.h"
+#include "datasets/readers/skeletons/skeleton_file.h"
 #include "tests/datasets/importers_bvh_text.h"
 
 namespace restage::test {

@@ -4,6 +4,7 @@
 #include <zlib.h>
 
 #include <cmath>
+#include <csignal>
 #include <filesystem>
 
 #include "autograd/base/error.h"
@@ -216,6 +217,21 @@ TEST_F(SchemaHdf5, AFileThatCannotBeWalkedToItsEndIsRefusedWhole) {
              "damaged, cut short");
 }
 
+/// A host that ignores SIGCHLD never hears how a child ended.
+TEST_F(SchemaHdf5, IsReadInAHostThatIgnoresSigchld) {
+  const std::string good = dir / "good.h5", bad = dir / "bad.h5";
+  write_one(good, "/joints", {2}, std::vector<float>(2));
+  std::string bytes = bytes_of(good);
+  bytes.resize(bytes.size() / 2);
+  write_bytes(bad, bytes);
+  const struct Ignored {
+    ~Ignored() { std::signal(SIGCHLD, before); }
+    void (*before)(int) = std::signal(SIGCHLD, SIG_IGN);
+  } ignored;
+  EXPECT_NO_THROW(h5::File::open(good));
+  EXPECT_HAS(error_of([&] { h5::File::open(bad); }), "damaged, cut short");
+}
+
 /// AddressSanitizer ends a process whose allocation fails.
 #ifdef __has_feature
 constexpr bool kEndsWithoutMemory = __has_feature(address_sanitizer);
@@ -285,7 +301,7 @@ TEST_F(SchemaHdf5, WhatOneReadTakesIsLimited) {
   const std::string said = error_of([&] { set.read<float>(); });
   EXPECT_HAS(said, "large.h5:/points: ");
   EXPECT_HAS(said, "10000000 bytes allowed");
-  EXPECT_HAS(said, "--max-memory");
+  EXPECT_HAS(said, "max_memory");
   std::vector<float> rows;
   set.read_rows(0, 800'000, rows);  // some of it may be in memory
   std::vector<double> twice;

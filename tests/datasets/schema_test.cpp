@@ -484,7 +484,7 @@ TEST_F(Merge, ClashesAreNamedAndAPrefixSolvesThem) {
   write_motions(b, {clip("walk", "bob", "train"), clip("run", "bob", "train")}, {});
   const std::string said = complaint({a, b}, out);
   EXPECT_HAS(said, "'walk' of " + a + " and " + b + " (and 1 more)");
-  EXPECT_HAS(said, "--prefix");
+  EXPECT_HAS(said, "prefix");
   merge_data({a, b}, out, {true});
   const std::vector<Motion> motions = read_motions(out);
   ASSERT_EQ(motions.size(), 4u);

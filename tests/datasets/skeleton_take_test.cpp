@@ -1,12 +1,12 @@
 // A skeleton's motion taken over by another: the same turns, to rounding; a place that fits.
-#include "datasets/importers/skeleton_take.h"
+#include "datasets/importers/motions/skeleton_take.h"
 
 #include <gtest/gtest.h>
 
 #include <functional>
 
 #include "autograd/base/format.h"
-#include "datasets/importers/gltf_character.h"
+#include "datasets/importers/rigs/gltf_character.h"
 #include "datasets/schema.h"
 #include "tests/datasets/gltf_maker.h"
 #include "tests/datasets/importers_support.h"
@@ -102,7 +102,7 @@ TEST_F(SkeletonTakeTest, RecordingsStandOnTheFloor) {
   const Joints rest = standing(1);
   const double sole = std::min({rest[7].y(), rest[8].y(), rest[10].y(), rest[11].y()});
   EXPECT_NEAR(floor_height(lowest), sole, 0.03);
-  EXPECT_HAS(refusal_of([&] { read_take(path, {.clip = "walk"}); }), "leave --clip out");
+  EXPECT_HAS(refusal_of([&] { read_take(path, {.clip = "walk"}); }), "leave clip out");
 }
 
 TEST_F(SkeletonTakeTest, WhatHoldsOne) {

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "datasets/importers/smpl.h"
+#include "datasets/importers/bodies/smpl.h"
 #include "tests/datasets/npz_support.h"
 #include "tests/support/tiny_body.h"
 

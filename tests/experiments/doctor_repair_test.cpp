@@ -1,5 +1,5 @@
 // What `restage doctor --fix` takes along of an HDF5 file, value by value.
-#include "experiments/doctor_repair.h"
+#include "datasets/doctor/mended_file.h"
 
 #include <gtest/gtest.h>
 

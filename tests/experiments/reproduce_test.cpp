@@ -60,7 +60,8 @@ class Reproduce : public FileTest {
                            {"overrides", Json::object()},
                            {"state", "done"},
                            {"error", nullptr},
-                           {"artifacts", Json::object()},
+                           {"artifacts", artifacts_},
+                           {"training", training_},
                            {"seconds", 60},
                            {"metrics",
                             {{"naked",
@@ -72,10 +73,23 @@ class Reproduce : public FileTest {
   }
   Judgement judged() const {
     const PaperFile file = read_paper_file(dir / "x/paper.yaml");
-    return judge(file, file.lite, file.claims[0], tables::read_results(dir / "x"), 0);
+    return judge(file, file.lite, file.claims[0], tables::read_results(dir / "x"));
   }
 
-  Json references_ = Json::object();  ///< of the rows that are put next
+  /// Of the rows that are put next.
+  Json references_ = Json::object(), artifacts_ = Json::object(), training_ = nullptr;
+
+  /// A difference with this 95 % interval.
+  static tables::Estimate estimate_of(double low, double high) {
+    tables::Estimate out;
+    out.n = kFewestSeeds;
+    out.mean = (low + high) / 2;
+    out.low = low;
+    out.high = high;
+    const double error = (high - low) / 2 / tables::student_quantile(0.95, 2);
+    out.parts = {{error * error, 2}};
+    return out;
+  }
 
  private:
   int made_ = 0;
@@ -85,34 +99,34 @@ TEST_F(Reproduce, AKnownOrderHoldsAndItsOppositeDoesNot) {
   put("old", 3, 0.10, 0.02, 0.001);
   put("new", 3, 0.09, 0.01, 0.001);
   const Judgement found = judged();
-  EXPECT_EQ(found.verdict, Verdict::holds);
+  EXPECT_EQ(found.verdict(), Verdict::holds);
   ASSERT_EQ(found.findings.size(), 2u);
   EXPECT_EQ(found.findings[0].metric, "mpjpe");
   EXPECT_NEAR(*found.findings[0].difference.mean, -0.01, 1e-12);
   EXPECT_EQ(found.findings[0].difference.n, 3);
   write(replaced(kPaper, "better: new, than: old", "better: old, than: new"));
-  EXPECT_EQ(judged().verdict, Verdict::does_not_hold);
+  EXPECT_EQ(judged().verdict(), Verdict::does_not_hold);
 }
 
 TEST_F(Reproduce, ATieCannotBeTold) {
   put("old", 3, 0.10, 0.02, 0.004);
   put("new", 3, 0.10, 0.02, -0.004);
   const Judgement tie = judged();
-  EXPECT_EQ(tie.verdict, Verdict::cannot_be_told);
+  EXPECT_EQ(tie.verdict(), Verdict::cannot_be_told);
   EXPECT_LT(*tie.findings[0].difference.low, 0);
   EXPECT_GT(*tie.findings[0].difference.high, 0);
   for (const Finding& f : tie.findings) EXPECT_EQ(f.verdict, Verdict::cannot_be_told) << f.metric;
   write(replaced(kPaper, "than: old}", "than: old, within: 0.1}"));
-  EXPECT_EQ(judged().verdict, Verdict::holds) << "they differ by less than 10 cm";
+  EXPECT_EQ(judged().verdict(), Verdict::holds) << "they differ by less than 10 cm";
   write(replaced(kPaper, "than: old}", "than: old, within: 0.001, metrics: [mpjpe]}"));
-  EXPECT_EQ(judged().verdict, Verdict::cannot_be_told) << "the interval is wider than that";
+  EXPECT_EQ(judged().verdict(), Verdict::cannot_be_told) << "the interval is wider than that";
 }
 
 TEST_F(Reproduce, WhatDiffersIsNotAlike) {
   put("old", 3, 0.10, 0.02, 0.001);
   put("new", 3, 0.06, 0.02, 0.001);
   write(replaced(kPaper, "than: old}", "than: old, within: 0.01, metrics: [mpjpe]}"));
-  EXPECT_EQ(judged().verdict, Verdict::does_not_hold);
+  EXPECT_EQ(judged().verdict(), Verdict::does_not_hold);
 }
 
 TEST_F(Reproduce, WhatGotWorseIsNoImprovement) {
@@ -121,20 +135,16 @@ TEST_F(Reproduce, WhatGotWorseIsNoImprovement) {
   write(unimproved);
   put("old", 3, 0.10, 0.02, 0.001);
   put("new", 3, 0.14, 0.02, 0.001);
-  EXPECT_EQ(judged().verdict, Verdict::holds) << "worse by 4 cm";
+  EXPECT_EQ(judged().verdict(), Verdict::holds) << "worse by 4 cm";
   write(replaced(unimproved, "better: new, than: old", "better: old, than: new"));
-  EXPECT_EQ(judged().verdict, Verdict::does_not_hold) << "better by 4 cm";
+  EXPECT_EQ(judged().verdict(), Verdict::does_not_hold) << "better by 4 cm";
 }
 
 TEST_F(Reproduce, AGainBelowTheMarginIsNotNoticeable) {
   const auto verdict = [](double low, double high) {
     Claim claim;
     claim.no_better_by = 0.002;
-    tables::Estimate difference;
-    difference.n = kFewestSeeds;
-    difference.low = low;
-    difference.high = high;
-    return verdict_of(difference, claim);
+    return finding_of(estimate_of(low, high), claim).verdict;
   };
   EXPECT_EQ(verdict(-0.0019, -0.001), Verdict::holds) << "better, by less than the margin";
   EXPECT_EQ(verdict(-0.001, 0.1), Verdict::holds);
@@ -147,34 +157,116 @@ TEST_F(Reproduce, AGainBelowTheMarginIsNotNoticeable) {
 TEST_F(Reproduce, TwoSeedsTellNothing) {
   put("old", 2, 0.20, 0.02, 0.001);
   put("new", 2, 0.05, 0.01, 0.001);
-  EXPECT_EQ(judged().verdict, Verdict::cannot_be_told);
+  EXPECT_EQ(judged().verdict(), Verdict::cannot_be_told);
 }
 
 TEST_F(Reproduce, OneMetricThatIsWorseEndsAClaimButNotOneOfMost) {
   put("old", 3, 0.10, 0.01, 0.001);
   put("new", 3, 0.09, 0.02, 0.001);
-  EXPECT_EQ(judged().verdict, Verdict::does_not_hold);
-  std::vector<Finding> findings(4);
-  for (Finding& f : findings) f.verdict = Verdict::holds;
-  EXPECT_EQ(verdict_of(findings, false), Verdict::holds);
-  findings[0].verdict = Verdict::does_not_hold;
-  EXPECT_EQ(verdict_of(findings, true), Verdict::holds) << "three of four";
-  EXPECT_EQ(verdict_of(findings, false), Verdict::does_not_hold);
-  findings[1].verdict = Verdict::cannot_be_told;
-  EXPECT_EQ(verdict_of(findings, true), Verdict::cannot_be_told);
-  findings[1].verdict = Verdict::does_not_hold;
-  EXPECT_EQ(verdict_of(findings, true), Verdict::does_not_hold);
-  findings[2].verdict = Verdict::not_run;
-  EXPECT_EQ(verdict_of(findings, true), Verdict::not_run);
-  EXPECT_EQ(verdict_of(std::vector<Finding>{}, true), Verdict::not_run);
+  EXPECT_EQ(judged().verdict(), Verdict::does_not_hold);
+  const Finding held{"", "", {}, 0, 1, Verdict::holds},
+      reversed{"", "", {}, 1, 0, Verdict::does_not_hold},
+      unclear{"", "", {}, 1, 1, Verdict::cannot_be_told};
+  const auto verdict = [](const std::vector<Finding>& findings, bool most) {
+    return judgement_of(findings, most).so_far;
+  };
+  EXPECT_EQ(verdict({held, held, held, held}, false), Verdict::holds);
+  EXPECT_EQ(verdict({reversed, held, held, held}, true), Verdict::holds) << "three of four";
+  EXPECT_EQ(verdict({reversed, held, held, held}, false), Verdict::does_not_hold);
+  EXPECT_EQ(verdict({reversed, unclear, held, held}, true), Verdict::cannot_be_told);
+  EXPECT_EQ(verdict({reversed, reversed, held, held}, true), Verdict::does_not_hold);
+  EXPECT_EQ(verdict({reversed, reversed, Finding{}, held}, true), Verdict::not_run);
+  EXPECT_EQ(verdict({}, true), Verdict::not_run);
+}
+
+TEST_F(Reproduce, OneOfManyComparisonsIsReversedByChance) {
+  Finding almost{"", "", {}, 1, 0.03, Verdict::does_not_hold};
+  Finding clear{"", "", {}, 0.001, 1, Verdict::holds};
+  EXPECT_EQ(judgement_of({almost}, false).so_far, Verdict::does_not_hold);
+  EXPECT_EQ(judgement_of({almost, clear}, false).so_far, Verdict::cannot_be_told)
+      << "one of two at 3 % is nothing at 5 %";
+}
+
+TEST_F(Reproduce, ClaimsOfAPageAreJudgedTogether) {
+  Judgement clear{Verdict::holds, {}, 0.001}, almost{Verdict::holds, {}, 0.04},
+      never{Verdict::cannot_be_told, {}, 0.5}, absent{Verdict::not_run};
+  judge_together({&almost, &never, &clear, &absent});
+  EXPECT_EQ(clear.so_far, Verdict::holds);
+  EXPECT_EQ(almost.so_far, Verdict::cannot_be_told) << "0.04 is more than 0.05 / 2";
+  EXPECT_EQ(absent.so_far, Verdict::not_run);
+  almost = {Verdict::does_not_hold, {}, 0.04};
+  judge_together({&almost, &clear});
+  EXPECT_EQ(almost.so_far, Verdict::does_not_hold) << "the last of two may have 0.05";
+}
+
+TEST_F(Reproduce, ASentenceWhoseReadingsDifferCannotBeTold) {
+  std::vector<Claim> claims(3);
+  claims[0].reading = claims[1].reading = "step by step";
+  claims[2].reading = "from the first";
+  const auto told = [&](const std::vector<Verdict>& verdicts) {
+    const std::vector<Sentence> all = sentences_of(claims, verdicts);
+    EXPECT_EQ(all.size(), 1u);
+    return std::pair(sentence_verdict(all[0]), best_reading(all[0]));
+  };
+  using enum Verdict;
+  EXPECT_EQ(told({holds, holds, holds}), std::pair(holds, holds));
+  EXPECT_EQ(told({holds, does_not_hold, holds}), std::pair(cannot_be_told, holds));
+  EXPECT_EQ(told({holds, does_not_hold, does_not_hold}), std::pair(does_not_hold, does_not_hold));
+}
+
+TEST_F(Reproduce, EqualPrintedFiguresSayNothing) {
+  const auto printed = [&](const char* old_figures, const char* new_figures) {
+    write(replaced(replaced(kPaper, "[0.16, 0.02]", old_figures), "[0.15, null]", new_figures));
+    const PaperFile file = read_paper_file(dir / "x/paper.yaml");
+    return printed_verdict(file, file.claims[0]);
+  };
+  EXPECT_EQ(printed("[0.16, 0.02]", "[0.15, null]"), Verdict::holds);
+  EXPECT_EQ(printed("[0.16, 0.02]", "[0.15, 0.02]"), Verdict::holds) << "acc is the same in print";
+  EXPECT_EQ(printed("[0.16, 0.02]", "[0.16, 0.02]"), Verdict::cannot_be_told);
+  EXPECT_EQ(printed("[0.16, 0.02]", "[0.15, 0.021]"), Verdict::does_not_hold);
+  EXPECT_EQ(printed("[0.043, 0.02]", "[0.044, 0.02]"), Verdict::does_not_hold) << "neighbours";
+  EXPECT_EQ(printed("[0.16, 0.02]", "[]"), Verdict::not_run);
+}
+
+TEST_F(Reproduce, WhatStillLearnsIsNotTrainedFarEnough) {
+  // The last quarter of 2,000 steps lowers the error by `gain`.
+  const auto curve = [](double gain) {
+    Json points = Json::array();
+    for (const int step : {0, 500, 1000, 1500, 1750, 2000})
+      points.push_back({step, step <= 1500 ? 0.1 + 1e-5 * (1500 - step) : 0.1 * (1 - gain)});
+    return Json{{"motion",
+                 {{"steps", 2000},
+                  {"batch", 16},
+                  {"curves", {{{"figure", "mpjpe"}, {"points", points}}}}}}};
+  };
+  artifacts_ = {{"motion", "0123456789ab"}};
+  put("old", 3, 0.10, 0.02, 0.001);
+  put("new", 3, 0.09, 0.01, 0.001);
+  Judgement found = judged();
+  EXPECT_EQ(found.verdict(), Verdict::not_trained);
+  EXPECT_EQ(found.too_short[0], "new: no curve of its motion stage was kept");
+  fs::remove_all(dir / "x/trials");
+  training_ = curve(0.01);
+  put("old", 3, 0.10, 0.02, 0.001);
+  put("new", 3, 0.09, 0.01, 0.001);
+  EXPECT_EQ(judged().verdict(), Verdict::holds);
+  fs::remove_all(dir / "x/trials");
+  put("old", 3, 0.10, 0.02, 0.001);
+  training_ = curve(0.05);
+  put("new", 3, 0.09, 0.01, 0.001);
+  found = judged();
+  EXPECT_EQ(found.verdict(), Verdict::not_trained);
+  ASSERT_EQ(found.too_short.size(), 1u);
+  EXPECT_EQ(found.too_short[0],
+            "new: the last quarter of its steps still lowers motion.mpjpe by 5.0 %");
 }
 
 TEST_F(Reproduce, WhatWasNotRunIsNotJudged) {
   put("old", 3, 0.10, 0.01, 0.001);
-  EXPECT_EQ(judged().verdict, Verdict::not_run);
+  EXPECT_EQ(judged().verdict(), Verdict::not_run);
 }
 
-TEST_F(Reproduce, ThePageHasBothFiguresAndTheVerdict) {
+TEST_F(Reproduce, ThePageHasTheVerdictAndTheTablesFileBothFigures) {
   put("old", 3, 0.10, 0.02, 0.001);
   put("new", 3, 0.09, 0.01, 0.001);
   dir.write("x/sweep.yaml", "base: nothing.yaml\n");
@@ -186,27 +278,35 @@ TEST_F(Reproduce, ThePageHasBothFiguresAndTheVerdict) {
     fs::remove(dir / "x/plan.json");
     return tables::read_results(dir / "x");
   }();
-  one.judgements = {judge(all[0].asked, all[0].asked.lite, all[0].asked.claims[0], one.results, 0)};
-  const PageOptions options{
-      "somebody2024", "lite", {"restage", "reproduce", "it's", "seeds=1,2"}, 0};
+  one.judgements = {judge(all[0].asked, all[0].asked.lite, all[0].asked.claims[0], one.results)};
+  const PageOptions options{"somebody2024", "lite", {"restage", "reproduce", "it's", "seeds=1,2"}};
   const std::string page = page_markdown({one}, options, "somebody2024", "..");
-  EXPECT_HAS(page, "a | b");
+  EXPECT_TRUE(page.starts_with("# somebody2024, run again\n\nClaims: 1 holds at lite.\n\n| claim"));
+  EXPECT_HAS(page, "new against old");
+  EXPECT_HAS(page, "[4](somebody2024/x.md)");
+  EXPECT_HAS(page, "[x](../x/README.md)");
+  EXPECT_HAS(page, "6 done");
   EXPECT_HAS(page, "restage reproduce 'it'\\''s' seeds=1,2\n");
-  EXPECT_HAS(page, "theirs (paper)");
-  EXPECT_HAS(page, "0.16");
-  EXPECT_HAS(page, "**holds**: new against old");
-  EXPECT_HAS(page, "absent is not run: nobody wrote it");
-  EXPECT_HAS(page, "Claims: 1 holds.");
-  EXPECT_HAS(page, "motion.optimiser.steps=7");
-  EXPECT_EQ(page_json({one}, options)["claims"][0]["verdict"], "holds");
+  EXPECT_EQ(page.find("theirs (paper)"), std::string::npos) << "figures have files of their own";
+  const std::string table = table_markdown(one, options, "../somebody2024.md", "../..");
+  EXPECT_HAS(table, "a | b");
+  EXPECT_HAS(table, "theirs (paper)");
+  EXPECT_HAS(table, "0.16");
+  EXPECT_HAS(table, "**holds at lite**: new against old");
+  EXPECT_HAS(table, "absent is not run: nobody wrote it");
+  EXPECT_HAS(table, "motion.optimiser.steps=7");
+  EXPECT_HAS(table, "(../somebody2024.md)");
+  EXPECT_HAS(table, "[x](../../x/README.md)");
+  EXPECT_EQ(page_json({one}, options)["claims"][0]["verdict"], "holds at lite");
   EXPECT_EQ(page_markdown({one}, options, "somebody2024", ".."), page) << "the same bytes again";
+  EXPECT_EQ(table_markdown(one, options, "../somebody2024.md", "../.."), table);
 }
 
-TEST_F(Reproduce, ThePageSaysWhereTheErrorsAre) {
+TEST_F(Reproduce, TheTablesFileSaysWhereTheErrorsAre) {
   put("new", 1, 0.10, 0.02, 0);  // 100, 130, 160, 190 mm; half of that in aligned joints
   const Evidence evidence{"x", "experiments/x", dir / "x", read_paper_file(dir / "x/paper.yaml")};
   const Found one{evidence, tables::read_results(dir / "x"), {judged()}};
-  const std::string text = page_markdown({one}, {"somebody2024", "lite", {"restage"}}, "t", "..");
+  const std::string text = table_markdown(one, {"somebody2024", "lite", {"restage"}}, "p", "..");
   for (const char* line :
        {"| walk, 90 frames | 57.5 |", "| run, 30 frames  | 87.5 |", "| a-b    |  65 |",
         "| b-a    |  80 |", "Worst sequences of new: run-b-a 95, run-a-b 80, walk-b-a 65, ",
@@ -227,7 +327,7 @@ TEST_F(Reproduce, WhatLearnsNothingStandsBelowTheRowWhoseInputItSees) {
   put("new", 2, 0.10, 0.02, 0.001);
   const Evidence evidence{"x", "experiments/x", dir / "x", read_paper_file(dir / "x/paper.yaml")};
   const Found one{evidence, tables::read_results(dir / "x"), {judged()}};
-  const std::string text = page_markdown({one}, {"somebody2024", "lite", {"restage"}}, "t", "..");
+  const std::string text = table_markdown(one, {"somebody2024", "lite", {"restage"}}, "p", "..");
   const auto value_of = [&](const std::string& label) {
     const size_t at = text.find("| " + label);
     if (at == std::string::npos || text.find("| " + label, at + 1) != std::string::npos)

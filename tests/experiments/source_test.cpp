@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "experiments/clips.h"
+#include "experiments/pictures/clips.h"
 #include "nn/geometry/mesh_file.h"
 #include "tests/support/files.h"
 

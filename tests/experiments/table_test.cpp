@@ -255,8 +255,9 @@ TEST_F(TableTest, ReferencesOfAllTrialsAreRowsOfTheirOwn) {
   EXPECT_EQ(json["references"].size(), 2u);
   // It is told that an average of what rows were measured beside is one, and what it was beside
   // each.
-  ASSERT_EQ(table.notices.size(), 1u);
+  ASSERT_EQ(table.notices.size(), 2u);
   EXPECT_HAS(table.notices[0], "averages: 'closed form on naked'; --against");
+  EXPECT_HAS(table.notices[1], "fewer than five trials stand behind");
   const auto by_case = reference_by_case(results, "naked", "closed form");
   EXPECT_NEAR(by_case.at("quaternion").at("mpjpe"), 0.075, 1e-12);
   EXPECT_NEAR(by_case.at("6D").at("mpjpe"), 0.175, 1e-12);
@@ -303,7 +304,7 @@ TEST_F(TableTest, NumbersOfAnAxisDoNotOverlap) {
 }
 
 TEST_F(TableTest, OurOwnBenchmarkCanBeRead) {
-  const std::string folder = std::string(RESTAGE_SOURCE_DIR) + "/experiments/benchmark";
+  const std::string folder = std::string(RESTAGE_SOURCE_DIR) + "/experiments/studies/benchmark";
   const Table table = make_table(read_results(folder), {});
   ASSERT_EQ(table.rows.size(), 5u);
   EXPECT_EQ(table.rows[0].label, "Restage lite");

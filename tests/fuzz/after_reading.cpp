@@ -6,8 +6,8 @@
 #include "autograd/base/error.h"
 #include "datasets/doctor/examine.h"
 #include "datasets/importers/import.h"
-#include "datasets/readers/frame_folder.h"
-#include "datasets/readers/mesh_io.h"
+#include "datasets/readers/clouds/mesh_io.h"
+#include "datasets/readers/frames/frame_folder.h"
 #include "datasets/schema.h"
 #include "infer/retargeter.h"
 #include "infer/writers/bvh.h"
@@ -82,7 +82,7 @@ void import_file(const std::string& bytes) {
 void extract(const std::string& bytes) {
   const Mesh mesh = parse_mesh(bytes, "x.obj");
   for (const Vec3& joint : extract_joints(tiny_models().need_as<SkeletonModel>("skeleton", "w"),
-                                          mesh.vertices, "x.obj", {1, 0}, 2))
+                                          mesh.vertices, "x.obj", {1, 0}, {.samples = 2}))
     if (!joint.allFinite()) throw std::logic_error("a joint is not finite");
 }
 
@@ -100,11 +100,11 @@ void retarget(const std::string& bytes) {
   for (const float size : {1.0f, 1.01f}) {
     Points cloud = mesh.vertices;
     for (Point& p : cloud) p *= size;
-    for (const RetargetedFrame& frame : system.push(cloud, "x.obj")) {
+    system.push(cloud, "x.obj", [&](const RetargetedFrame& frame) {
       finite(frame.vertices);
       glb.push(frame.pose);
       bvh.push(frame.pose);
-    }
+    });
   }
   glb.commit();
   bvh.commit();

@@ -27,6 +27,8 @@ def arguments():
     parser.add_argument("--program", type=pathlib.Path, default=HERE.parent.parent / "build/fuzz/restage_fuzz")
     parser.add_argument("--targets", help="some of them, with commas between; else all")
     parser.add_argument("--seconds", type=int, default=5, help="for each target")
+    parser.add_argument("--changed", nargs="*", default=[], metavar="FILE",
+                        help="targets whose name is in the name of one of these files get four times the seconds")
     parser.add_argument("--inputs", type=int, help="for each target, instead of seconds")
     parser.add_argument("--seed", type=int, default=int(time.time()), help="else another one each time")
     parser.add_argument("--jobs", type=int, default=2, help="targets at a time")
@@ -45,6 +47,11 @@ def environment(scratch):
                 UBSAN_OPTIONS="print_stacktrace=1:halt_on_error=1")
 
 
+def seconds(options, name):
+    stems = " ".join(pathlib.PurePath(file).stem for file in options.changed)
+    return options.seconds * (4 if name in stems or name.split("_")[0] in re.split(r"[ _]", stems) else 1)
+
+
 def fuzz(options, name, longest, allocation, words=None):
     """One run; a row of the table."""
     corpus, findings = options.corpus / name, options.findings / name
@@ -57,7 +64,7 @@ def fuzz(options, name, longest, allocation, words=None):
     program = [str(options.program), f"--target={name}"]
     try:
         subprocess.run(program + [f"--seeds={corpus}"], check=True, env=environment(scratch))
-        limit = f"-runs={options.inputs}" if options.inputs else f"-max_total_time={options.seconds}"
+        limit = f"-runs={options.inputs}" if options.inputs else f"-max_total_time={seconds(options, name)}"
         command = program + [limit, f"-max_len={longest}", f"-malloc_limit_mb={allocation}", "-rss_limit_mb=1536",
                              "-timeout=30", f"-seed={options.seed}", f"-artifact_prefix={findings}/", "-print_final_stats=1",
                              "-verbosity=1", "-use_value_profile=1"]

@@ -4,10 +4,10 @@
 #include <map>
 
 #include "datasets/builtin/bodies.h"
-#include "datasets/importers/profiles.h"
+#include "datasets/importers/rigs/profiles.h"
 #include "datasets/sampling/surface.h"
 #include "datasets/schema.h"
-#include "experiments/cli/benchmark_config.h"
+#include "experiments/cli/training/benchmark_config.h"
 #include "nn/config/config.h"
 #include "nn/weights/bundle.h"
 #include "tests/datasets/gltf_maker.h"

@@ -2,7 +2,12 @@
 
 #include <gtest/gtest.h>
 
+#include <cstdlib>
+#include <filesystem>
 #include <utility>
+
+#include "autograd/base/error.h"
+#include "tests/support/files.h"
 
 namespace restage {
 namespace {
@@ -45,6 +50,31 @@ TEST(FrameStore, WhatIsDoneToAFrameIsKept) {
   store.assign(3, last);
   EXPECT_EQ(store.size(), 3u);
   EXPECT_EQ(std::as_const(store).back(), std::vector<float>(5, 2.5f));
+}
+
+class FrameStoreFiles : public test::FileTest {
+ protected:
+  FrameStoreFiles() {
+    if (const char* value = std::getenv("TMPDIR")) before_ = value;
+  }
+  ~FrameStoreFiles() override {
+    if (before_)
+      ::setenv("TMPDIR", before_->c_str(), 1);
+    else
+      ::unsetenv("TMPDIR");
+  }
+
+ private:
+  std::optional<std::string> before_;
+};
+
+TEST_F(FrameStoreFiles, FramesArePutAwayWhereTheUserWantsThem) {
+  std::filesystem::create_directory(dir / "mine");
+  ::setenv("TMPDIR", std::string(dir / "mine").c_str(), 1);
+  EXPECT_EQ(numbered(100).size(), 100u);
+  EXPECT_TRUE(std::filesystem::is_empty(dir / "mine")) << "nothing is left";
+  ::setenv("TMPDIR", std::string(dir / "not there").c_str(), 1);
+  EXPECT_THROW(numbered(100), WorkError);
 }
 
 }  // namespace

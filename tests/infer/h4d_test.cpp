@@ -7,6 +7,7 @@
 #include "datasets/sampling/code_windows.h"
 #include "infer/systems.h"
 #include "tests/support/errors.h"
+#include "tests/support/frames.h"
 #include "tests/support/tiny_body.h"
 
 namespace restage {
@@ -63,23 +64,24 @@ Points boxes_in(size_t frame, const Point& by = Point::Zero()) {
 
 TEST(H4dSystem, AnswersTheFirstWindowAtOnceAndThenEveryCloud) {
   H4dSystem h4d = h4d_system();
-  for (size_t f = 0; f < 5; ++f) EXPECT_TRUE(h4d.push(boxes_in(f), "a cloud").empty());
-  EXPECT_EQ(h4d.push(boxes_in(5), "a cloud").size(), 6u);
-  const auto frames = h4d.push(boxes_in(6), "a cloud");
+  for (size_t f = 0; f < 5; ++f) EXPECT_TRUE(pushed(h4d, boxes_in(f), "a cloud").empty());
+  EXPECT_EQ(pushed(h4d, boxes_in(5), "a cloud").size(), 6u);
+  const auto frames = pushed(h4d, boxes_in(6), "a cloud");
   ASSERT_EQ(frames.size(), 1u);
   ASSERT_TRUE(frames[0].joints);
   EXPECT_EQ(frames[0].vertices.size(), boxes().rest.vertices.size());
-  EXPECT_TRUE(h4d.finish().empty());
-  for (size_t f = 0; f < 2; ++f) EXPECT_TRUE(h4d.push(boxes_in(f), "a cloud").empty());
-  EXPECT_EQ(h4d.finish().size(), 2u);  // a source that ends before its first window
+  EXPECT_TRUE(finished(h4d).empty());
+  for (size_t f = 0; f < 2; ++f) EXPECT_TRUE(pushed(h4d, boxes_in(f), "a cloud").empty());
+  EXPECT_EQ(finished(h4d).size(), 2u);  // a source that ends before its first window
 }
 
 TEST(H4dSystem, StandsWhereTheSourceStandsInProportion) {
   H4dSystem here = h4d_system(), there = h4d_system();
   const Point by(2, 0, -3);
   for (size_t f = 0; f < 5; ++f)
-    here.push(boxes_in(f), "a cloud"), there.push(boxes_in(f, by), "it");
-  const auto a = here.push(boxes_in(5), "a cloud"), b = there.push(boxes_in(5, by), "a cloud");
+    pushed(here, boxes_in(f), "a cloud"), pushed(there, boxes_in(f, by), "it");
+  const auto a = pushed(here, boxes_in(5), "a cloud"),
+             b = pushed(there, boxes_in(5, by), "a cloud");
   ASSERT_EQ(a.size(), b.size());
   for (size_t f = 0; f < a.size(); ++f) {
     const Vec3 moved = b[f].pose.root - a[f].pose.root;
@@ -93,19 +95,19 @@ TEST(H4dSystem, StandsWhereTheSourceStandsInProportion) {
 TEST(H4dSystem, GapsAreFilledBetweenTheirEnds) {
   H4dSystem h4d = h4d_system();
   h4d.miss();
-  for (size_t f = 0; f < 5; ++f) h4d.push(boxes_in(f), "a cloud");
-  const auto first = h4d.push(boxes_in(5), "a cloud");
+  for (size_t f = 0; f < 5; ++f) pushed(h4d, boxes_in(f), "a cloud");
+  const auto first = pushed(h4d, boxes_in(5), "a cloud");
   ASSERT_EQ(first.size(), 7u);
   EXPECT_TRUE(first[0].filled);
   EXPECT_EQ(first[0].vertices[0], first[1].vertices[0]);
   const Vec3 from = first[6].pose.root;
   h4d.miss();
-  const auto next = h4d.push(boxes_in(7), "a cloud");
+  const auto next = pushed(h4d, boxes_in(7), "a cloud");
   ASSERT_EQ(next.size(), 2u);
   EXPECT_TRUE(next[0].filled);
   EXPECT_LT((next[0].pose.root - 0.5 * (from + next[1].pose.root)).norm(), 1e-6);
   h4d.miss();
-  EXPECT_EQ(h4d.finish().size(), 1u);
+  EXPECT_EQ(finished(h4d).size(), 1u);
 }
 
 /// The middle that needs no vertex is that of the posed vertices.
@@ -174,7 +176,7 @@ TEST(H4dSystem, RefusesWhatItCannotUse) {
   EXPECT_HAS(refused([&] { H4dSystem(bare, "weights", boxes().rest, "target", {}, {}); }),
              "without a body");
   H4dSystem h4d = h4d_system();
-  EXPECT_HAS(refused([&] { h4d.push(Points(3), "three"); }), "three");
+  EXPECT_HAS(refused([&] { pushed(h4d, Points(3), "three"); }), "three");
 }
 
 }  // namespace

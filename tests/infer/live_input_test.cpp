@@ -109,16 +109,35 @@ TEST_F(LiveInput, AStalledSenderIsReplacedByOneThatSendsAFrame) {
   const Client stalled(port_), idle(port_);
   stalled.send(one_frame(1) + one_frame(2).substr(0, 9));
   EXPECT_EQ(next(), 1);
+  std::this_thread::sleep_for(kSilence + std::chrono::milliseconds(100));
   const Client fresh(port_);
   fresh.send(one_frame(7).substr(0, 15));  // no whole frame: nobody is replaced
   EXPECT_EQ(next(50), -1);
-  stalled.send(one_frame(2).substr(9));
-  EXPECT_EQ(next(), 2);
   fresh.send(one_frame(7).substr(15));
   EXPECT_EQ(next(), 7);
-  EXPECT_TRUE(stalled.closed());
+  stalled.send(one_frame(2).substr(9));  // comes too late
+  EXPECT_EQ(next(50), -1);
   fresh.send(one_frame(8));
   EXPECT_EQ(next(), 8);
+}
+
+TEST_F(LiveInput, TwoThatSendDoNotDeposeEachOther) {
+  listen();
+  auto first = std::make_unique<Client>(port_);
+  first->send(one_frame(1));
+  EXPECT_EQ(next(), 1);
+  const Client second(port_);
+  for (const float seconds : {2.f, 3.f, 4.f}) {
+    second.send(one_frame(100 + seconds));
+    EXPECT_EQ(next(50), -1) << "the first one is sending";
+    first->send(one_frame(seconds));
+    EXPECT_EQ(next(), seconds);
+  }
+  EXPECT_EQ(box_.counts().arrived, 7);
+  EXPECT_EQ(box_.counts().other_sender, 3);
+  first.reset();
+  second.send(one_frame(105));
+  EXPECT_EQ(next(), 105) << "the first one has ended";
 }
 
 TEST_F(LiveInput, ManyConnectionsThatSayNothingDoNotLockTheDoor) {
@@ -171,12 +190,13 @@ class LiveFolder : public LiveInput {
                       [](const std::string& a, const std::string& b) {
                         return a.size() < b.size() || (a.size() == b.size() && a < b);
                       },
-                      [](const std::string& path, size_t&) {
+                      [](const std::string& path, LiveCloud& into) {
                         std::ifstream file(path);
                         std::string text;
                         file >> text;
                         if (!text.ends_with("x")) throw InputError(path, "is cut", "wait");
-                        return Points{Point(std::stof(text), 0, 0)};
+                        into.points = {Point(std::stof(text), 0, 0)};
+                        return int64_t{0};
                       }};
     reading_.emplace(std::make_unique<FolderInput>(folder_, std::move(files)), box_, words_);
   }

@@ -14,6 +14,7 @@
 #include "autograd/base/error.h"
 #include "infer/live/frame_parser.h"
 #include "infer/live/latency.h"
+#include "infer/live/sender_clock.h"
 #include "infer/live/server.h"
 #include "infer/live/timeline.h"
 #include "infer/live/vmc.h"
@@ -105,12 +106,14 @@ TEST(LiveMailbox, KeepsTheNewest) {
   }
   box.pass(4);
   box.refuse();
+  box.leave_out();
   ASSERT_TRUE(box.take(cloud, std::chrono::milliseconds(1)));
   EXPECT_EQ(cloud.seconds, 3);
   const Mailbox::Counts counts = box.counts();
-  EXPECT_EQ(counts.arrived, 8);
+  EXPECT_EQ(counts.arrived, 9);
   EXPECT_EQ(counts.overtaken, 6);
   EXPECT_EQ(counts.refused, 1);
+  EXPECT_EQ(counts.other_sender, 1);
   // What was put last is still taken when nothing more will come.
   box.put(cloud);
   box.close();
@@ -193,6 +196,42 @@ TEST(LiveTimeline, GapsAndClocksThatJump) {
   line = {};  // another sender has another clock
   line.place(0, 1);
   EXPECT_EQ(line.place(1 / 30., 2).kind, Kind::anew);
+}
+
+/// Seconds that a clock gives for clouds that are captured `apart` seconds apart, by our clock, and
+/// whose times lie `step` apart.
+std::vector<double> seconds_of(double step, double apart, int count = 12) {
+  SenderClock clock;
+  Words words;
+  LiveCloud cloud;
+  std::vector<double> out;
+  for (int k = 0; k < count; ++k) {
+    cloud.seconds = 5000 + k * step;
+    cloud.arrived = Clock::time_point() + std::chrono::duration_cast<Clock::duration>(
+                                              std::chrono::duration<double>(k * apart));
+    out.push_back(clock.seconds(cloud, words));
+  }
+  return out;
+}
+
+TEST(LiveSenderClock, MillisecondsAndNanosecondsAreRecognised) {
+  for (const double unit : {1e3, 1e6, 1e9}) {
+    const auto made = seconds_of(unit / 30, 1.0 / 30);
+    for (size_t k = 5; k < made.size(); ++k)
+      EXPECT_NEAR(made[k] - made[k - 1], 1.0 / 30, 1e-6) << unit << " " << k;
+  }
+}
+
+TEST(LiveSenderClock, SecondsStaySeconds) {
+  for (const double apart : {1.0 / 90, 1.0 / 30, 0.5, 2.0}) {
+    const auto made = seconds_of(apart, apart);
+    for (size_t k = 0; k < made.size(); ++k)
+      EXPECT_EQ(made[k], 5000 + static_cast<double>(k) * apart);
+  }
+  const auto at_once = seconds_of(1, 1e-5);  // a pipe that does not wait
+  EXPECT_EQ(at_once.back(), 5011);
+  const auto frames = seconds_of(1, 1.0 / 30);  // a clock that counts frames
+  EXPECT_EQ(frames.back(), 5011);
 }
 
 TEST(LiveLatency, QuantilesToOnePercentAndTheLongestExactly) {

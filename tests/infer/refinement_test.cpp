@@ -7,6 +7,7 @@
 #include "datasets/sampling/surface.h"
 #include "infer/systems.h"
 #include "tests/support/errors.h"
+#include "tests/support/frames.h"
 #include "tests/support/small_models.h"
 
 namespace restage {
@@ -81,18 +82,27 @@ double mean_gap(const Joints& a, const Joints& b) {
   return sum;
 }
 
-std::unique_ptr<Retargeter> chain(const Scene& s, double fps = kFps) {
-  RetargetOptions options;
-  options.fps = fps;
-  options.samples = 1;
-  return std::make_unique<Retargeter>(s.models, "w", person().rest, person().joints, options);
+RetargetOptions plain_options(double fps = kFps) {
+  RetargetOptions out;
+  out.fps = fps;
+  out.samples = 1;
+  return out;
+}
+
+std::unique_ptr<Retargeter> chain(const Scene& s) {
+  return std::make_unique<Retargeter>(s.models, "w", person().rest, person().joints,
+                                      plain_options());
+}
+
+Refinement refinement(const Scene& s, double fps = kFps) {
+  return Refinement("target", s.models, "w", person().rest, person().joints, plain_options(fps));
 }
 
 TEST(Refinement, BringsLimbsToWhereTheCloudIs) {
   const Scene s = scene();
-  const Joints answer = *chain(s)->push(s.cloud, "cloud")[0].joints;
-  Refinement refined(chain(s), "target");
-  const RetargetedFrame frame = refined.push(s.cloud, "cloud")[0];
+  const Joints answer = *pushed(*chain(s), s.cloud, "cloud")[0].joints;
+  Refinement refined = refinement(s);
+  const RetargetedFrame frame = pushed(refined, s.cloud, "cloud")[0];
   EXPECT_GT(mean_gap(answer, s.truth), 0.03);
   EXPECT_LT(mean_gap(*frame.joints, s.truth), 0.5 * mean_gap(answer, s.truth));
   EXPECT_LT(mean_gap(*refined.source_joints(), s.truth), 0.5 * mean_gap(answer, s.truth));
@@ -108,7 +118,7 @@ TEST(CopySystem, IsTheChainWithTheClosedForm) {
     if (motion != "motion/closed_form")
       in.weights.put("motion", testing::untrained_bundle(motion).need("motion", "test"));
     in.options.samples = 1;
-    return *make_system(system_type(system), std::move(in))->push(s.cloud, "cloud")[0].joints;
+    return *pushed(*make_system(system_type(system), std::move(in)), s.cloud, "cloud")[0].joints;
   };
   const Joints copied = answer("copy", "smrm/rot6d");
   EXPECT_EQ(copied, answer("chain", "motion/closed_form"));
@@ -117,23 +127,22 @@ TEST(CopySystem, IsTheChainWithTheClosedForm) {
 
 TEST(Refinement, FramesOfAGapAreTheChains) {
   const Scene s = scene();
-  Refinement refined(chain(s), "target");
-  refined.push(s.cloud, "first");
+  Refinement refined = refinement(s);
+  pushed(refined, s.cloud, "first");
   refined.miss();
-  EXPECT_THROW(refined.push(Points(1000, Point(1, 2, 3)), "one place"), UnusableCloud);
+  EXPECT_THROW(pushed(refined, Points(1000, Point(1, 2, 3)), "one place"), UnusableCloud);
   refined.miss();
-  const auto frames = refined.push(s.cloud, "fourth");
+  const auto frames = pushed(refined, s.cloud, "fourth");
   ASSERT_EQ(frames.size(), 3u);
   EXPECT_TRUE(frames[0].filled && frames[1].filled && !frames[2].filled);
   EXPECT_LT(mean_gap(*frames[2].joints, s.truth), 0.5 * mean_gap(*frames[1].joints, s.truth));
   refined.miss();
-  EXPECT_EQ(refined.finish().size(), 1u);
+  EXPECT_EQ(finished(refined).size(), 1u);
 }
 
 TEST(Refinement, IsForCloudsThatAreAnsweredAtOnce) {
   const Scene s = scene();
-  test::expect_error<InputError>([&] { Refinement(chain(s, 60), "target"); },
-                                 {"target", "30 frames per second"});
+  test::expect_error<InputError>([&] { refinement(s, 60); }, {"target", "30 frames per second"});
 }
 
 }  // namespace

@@ -10,6 +10,7 @@
 #include "datasets/builtin/bodies.h"
 #include "datasets/sampling/surface.h"
 #include "nn/models/views.h"
+#include "tests/support/frames.h"
 #include "tests/support/use_set.h"
 
 namespace restage {
@@ -51,7 +52,8 @@ double mean_distance(const Joints& a, const Joints& b) {
 }
 
 RetargetedFrame registered(const Body& target, const Points& cloud) {
-  return Registration(target.rest, target.joints, "target").push(cloud, "cloud")[0];
+  Registration registration(target.rest, target.joints, "target");
+  return pushed(registration, cloud, "cloud")[0];
 }
 
 TEST(Registration, RecoversThePoseOfTheSameBody) {
@@ -91,8 +93,8 @@ TEST(Registration, TheSameBitsForAnyNumberOfThreads) {
   for (const int n : {1, 2, 3}) {
     const testing::UseThreads use(n);
     Registration registration(body().rest, body().joints, "target");
-    registration.push(cloud, "first");
-    found.push_back(registration.push(cloud, "second")[0]);  // with a frame before
+    pushed(registration, cloud, "first");
+    found.push_back(pushed(registration, cloud, "second")[0]);  // with a frame before
   }
   for (size_t k = 1; k < found.size(); ++k)
     for (size_t v = 0; v < found[0].vertices.size(); ++v)
@@ -159,39 +161,55 @@ TEST(Registration, MissedFramesLieBetweenThoseAround) {
   };
   Registration registration(body().rest, body().joints, "target");
   registration.miss();
-  const auto first = registration.push(scan(body(), at(0)), "first");
+  const auto first = pushed(registration, scan(body(), at(0)), "first");
   ASSERT_EQ(first.size(), 2u) << "the missed one before is as the first";
   EXPECT_TRUE(first[0].filled && !first[1].filled);
   EXPECT_EQ(*first[0].joints, *first[1].joints);
   const Joints before = *first[1].joints;
   registration.miss();
-  const auto pushed = registration.push(scan(body(), at(0.2)), "second");
-  ASSERT_EQ(pushed.size(), 2u);
-  EXPECT_TRUE(pushed[0].filled && !pushed[1].filled);
-  EXPECT_EQ(pushed[0].vertices.size(), body().rest.vertices.size());
-  const Joints after = *pushed[1].joints;
-  EXPECT_LT(((*pushed[0].joints)[0] - (before[0] + after[0]) / 2).norm(), 1e-9);
-  EXPECT_THROW(registration.push({}, "none"), UnusableCloud);
+  const auto second = pushed(registration, scan(body(), at(0.2)), "second");
+  ASSERT_EQ(second.size(), 2u);
+  EXPECT_TRUE(second[0].filled && !second[1].filled);
+  EXPECT_EQ(second[0].vertices.size(), body().rest.vertices.size());
+  const Joints after = *second[1].joints;
+  EXPECT_LT(((*second[0].joints)[0] - (before[0] + after[0]) / 2).norm(), 1e-9);
+  EXPECT_THROW(pushed(registration, {}, "none"), UnusableCloud);
   registration.miss();
-  const auto last = registration.finish();
+  const auto last = finished(registration);
   ASSERT_EQ(last.size(), 1u);
   EXPECT_EQ(*last[0].joints, after);
   registration.restart();
   registration.miss();
-  EXPECT_TRUE(registration.finish().empty());
+  EXPECT_TRUE(finished(registration).empty());
+}
+
+TEST(Registration, FinishBeginsAnew) {
+  Pose far = step_pose(body());
+  far.local[0] = Mat3::Identity();
+  far.root.z() += 0.5;
+  const auto second = [&](Registration& registration) {
+    registration.miss();
+    const auto frames = pushed(registration, scan(body(), far), "second");
+    return std::vector<Joints>{*frames[0].joints, *frames[1].joints};
+  };
+  Registration used(body().rest, body().joints, "target"), fresh(body().rest, body().joints, "it");
+  pushed(used, scan(builtin_body(1, "test", 3), step_pose(builtin_body(1, "test", 3))), "first");
+  used.miss();
+  EXPECT_EQ(finished(used).size(), 1u);
+  EXPECT_EQ(second(used), second(fresh));
 }
 
 TEST(Registration, OddInputsAreRefused) {
   const Points cloud = scan(body(), step_pose(body()));
   Registration registration(body().rest, body().joints, "target");
-  EXPECT_THROW(registration.push({}, "none"), InputError);
-  EXPECT_THROW(registration.push({cloud.begin(), cloud.begin() + 20}, "few"), InputError);
-  EXPECT_THROW(registration.push(Points(1000, Point(1, 2, 3)), "one place"), InputError);
+  EXPECT_THROW(pushed(registration, {}, "none"), InputError);
+  EXPECT_THROW(pushed(registration, {cloud.begin(), cloud.begin() + 20}, "few"), InputError);
+  EXPECT_THROW(pushed(registration, Points(1000, Point(1, 2, 3)), "one place"), InputError);
   for (const float wrong :
        {std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity(), 3e38f}) {
     Points bad = cloud;
     bad[7].y() = wrong;
-    EXPECT_THROW(registration.push(bad, "not finite"), InputError);
+    EXPECT_THROW(pushed(registration, bad, "not finite"), InputError);
   }
   Mesh few{{cloud.begin(), cloud.begin() + 20}, {}};
   EXPECT_THROW(Registration(few, body().joints, "few"), InputError);

@@ -19,8 +19,8 @@ std::vector<RetargetedFrame> with_gaps(Retargeter& r, const std::vector<Joints>&
     if (std::find(missed.begin(), missed.end(), f) != missed.end())
       r.miss();
     else
-      keep(r.push_joints(source[f]));
-  keep(r.finish());
+      keep(pushed_joints(r, source[f]));
+  keep(finished(r));
   return out;
 }
 
@@ -101,7 +101,7 @@ TEST(InferRetargeter, NobodyIsSureOfAFilledFrame) {
     }
     SeenJoints seen = source[f];
     seen.uncertainty.emplace().fill(0.002);
-    for (const RetargetedFrame& frame : r.push_joints(seen)) frames.push_back(frame);
+    for (const RetargetedFrame& frame : pushed_joints(r, seen)) frames.push_back(frame);
   }
   ASSERT_EQ(frames.size(), source.size());
   for (const size_t f : {5u, 6u}) {

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "infer/retargeter.h"
+#include "tests/support/frames.h"
 #include "tests/support/small_models.h"
 #include "tests/support/tiny_body.h"
 
@@ -31,7 +32,7 @@ inline const Body& target() {
 inline std::vector<RetargetedFrame> run(Retargeter& r, const std::vector<Joints>& source) {
   std::vector<RetargetedFrame> out;
   for (const Joints& j : source)
-    for (const RetargetedFrame& f : r.push_joints(j)) out.push_back(f);
+    for (const RetargetedFrame& f : pushed_joints(r, j)) out.push_back(f);
   return out;
 }
 

@@ -7,8 +7,8 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
-#include "datasets/importers/gltf_rig.h"
-#include "datasets/importers/skeleton_take.h"
+#include "datasets/importers/motions/skeleton_take.h"
+#include "datasets/importers/rigs/gltf_rig.h"
 #include "infer/writers/glb.h"
 #include "infer/writers/vrma.h"
 #include "tests/infer/toy_body.h"

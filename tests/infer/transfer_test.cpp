@@ -6,6 +6,7 @@
 #include "nn/geometry/box.h"
 #include "nn/models/registry.h"
 #include "tests/support/errors.h"
+#include "tests/support/frames.h"
 
 namespace restage {
 namespace {
@@ -36,7 +37,7 @@ Transfer system(const std::string& points) {
 TEST(TransferSystem, StandsWhereTheSourceStands) {
   Transfer transfer = system("50");
   const Points seen = cloud(Point(3, 0.2f, -1));
-  const auto frames = transfer.push(seen, "a cloud");
+  const auto frames = pushed(transfer, seen, "a cloud");
   ASSERT_EQ(frames.size(), 1u);
   const Box there = box_of(seen), box = box_of(frames[0].vertices);
   EXPECT_NEAR(box.min().y(), there.min().y(), 1e-5);
@@ -47,16 +48,31 @@ TEST(TransferSystem, StandsWhereTheSourceStands) {
 
 TEST(TransferSystem, GapsAreFilledBetweenTheirEnds) {
   Transfer transfer = system("0");
-  const Point from = transfer.push(cloud(Point::Zero()), "first")[0].vertices[0];
+  const Point from = pushed(transfer, cloud(Point::Zero()), "first")[0].vertices[0];
   transfer.miss();
-  const auto frames = transfer.push(cloud(Point(2, 0, 0)), "third");
+  const auto frames = pushed(transfer, cloud(Point(2, 0, 0)), "third");
   ASSERT_EQ(frames.size(), 2u);
   EXPECT_TRUE(frames[0].filled);
   EXPECT_FALSE(frames[1].filled);
   const Point between = 0.5f * from + 0.5f * frames[1].vertices[0];
   EXPECT_LT((frames[0].vertices[0] - between).norm(), 1e-5f);
   transfer.miss();
-  EXPECT_EQ(transfer.finish().size(), 1u);
+  EXPECT_EQ(finished(transfer).size(), 1u);
+}
+
+TEST(TransferSystem, FinishBeginsAnew) {
+  Transfer used = system("0"), fresh = system("0");
+  Points tall = cloud(Point(1, 0, 0));
+  for (Point& p : tall) p.y() *= 1.2f;
+  const auto second = [](Transfer& transfer) {
+    transfer.miss();
+    const auto frames = pushed(transfer, cloud(Point(2, 0, 0)), "second");
+    return std::vector<Points>{frames[0].vertices, frames[1].vertices};
+  };
+  pushed(used, tall, "first");
+  used.miss();
+  EXPECT_EQ(finished(used).size(), 1u);
+  EXPECT_EQ(second(used), second(fresh));
 }
 
 /// A body whose height and width follow the performer's, and codes that are these two numbers.
@@ -92,9 +108,9 @@ TEST(TransferSystem, CodesAreMixedInGapsWhereAModelHasSome) {
   Points wide = cloud(Point(4, 0, 0));
   for (Point& p : wide) p.z() *= 9;
   const float narrow_is =
-      box_of(transfer.push(cloud(Point::Zero()), "first")[0].vertices).sizes().z();
+      box_of(pushed(transfer, cloud(Point::Zero()), "first")[0].vertices).sizes().z();
   transfer.miss();
-  const auto frames = transfer.push(wide, "third");
+  const auto frames = pushed(transfer, wide, "third");
   ASSERT_EQ(frames.size(), 2u);
   EXPECT_TRUE(frames[0].filled);
   const Box between = box_of(frames[0].vertices), end = box_of(frames[1].vertices);
@@ -125,7 +141,7 @@ TEST(TransferSystem, SeesVerticesShuffledAndAnswersInTheTargetsOrder) {
                           {{"points", "50"}}});
   const Points target = cloud(Point::Zero());
   Transfer transfer(bundle, "weights", {target, {}}, "target", {});
-  const Points answer = transfer.push(target, "a cloud")[0].vertices;
+  const Points answer = pushed(transfer, target, "a cloud")[0].vertices;
   ASSERT_EQ(answer.size(), target.size());
   size_t moved = 0;
   for (size_t i = 0; i < target.size(); ++i) {
@@ -158,7 +174,7 @@ TEST(TransferSystem, VerticesFollowThoseThatTheNetworkMoves) {
   Tensor shown;
   Transfer transfer(same(&shown, {{"points", "50"}, {"vertices", "100"}}), "weights", {grid(), {}},
                     "target", {});
-  const Points answer = transfer.push(grid(), "a cloud")[0].vertices;
+  const Points answer = pushed(transfer, grid(), "a cloud")[0].vertices;
   EXPECT_EQ(shown.size(1), 100);
   ASSERT_EQ(answer.size(), grid().size());
   for (size_t i = 0; i < answer.size(); ++i)
@@ -170,7 +186,7 @@ TEST(TransferSystem, SmallTargetsAreShownWhole) {
   Tensor shown;
   Transfer transfer(same(&shown, {{"points", "50"}, {"vertices", "1000"}}), "weights", {grid(), {}},
                     "target", {});
-  transfer.push(grid(), "a cloud");
+  pushed(transfer, grid(), "a cloud");
   EXPECT_EQ(shown.size(1), 900);
 }
 
@@ -187,8 +203,8 @@ Bundle tst(const Settings& settings) {
 TEST(TransferSystem, ANetworkThatNeedsCorrespondence) {
   const Settings settings = {{"vertices", "8"}, {"kept", "0,100,200,300,400,500,600,700"}};
   Transfer transfer(tst(settings), "weights", {grid(), {}}, "target", {});
-  EXPECT_EQ(transfer.push(grid(), "a mesh")[0].vertices.size(), grid().size());
-  EXPECT_HAS(test::error_of([&] { transfer.push(cloud(Point::Zero()), "a cloud"); }),
+  EXPECT_EQ(pushed(transfer, grid(), "a mesh")[0].vertices.size(), grid().size());
+  EXPECT_HAS(test::error_of([&] { pushed(transfer, cloud(Point::Zero()), "a cloud"); }),
              "900 vertices in their order");
   const auto refused = [&](const Settings& bad) {
     return test::error_of([&] { Transfer(tst(bad), "weights", {grid(), {}}, "target", {}); });

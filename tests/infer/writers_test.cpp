@@ -6,9 +6,9 @@
 #include <cstring>
 #include <numbers>
 
-#include "datasets/readers/bvh.h"
+#include "datasets/frame_writer.h"
+#include "datasets/readers/skeletons/bvh.h"
 #include "infer/writers/bvh.h"
-#include "infer/writers/frames.h"
 #include "infer/writers/glb.h"
 #include "tests/infer/toy_body.h"
 #include "tests/support/files.h"

@@ -19,6 +19,7 @@
 #include "nn/layers/linear.h"
 #include "nn/models/registry.h"
 #include "nn/models/transfer.h"
+#include "train/stages/supervised_stage.h"
 #include "train/training/training.h"
 
 namespace mine {
@@ -130,38 +131,28 @@ void visit(V& v, ShiftStageConfig& c) {
   v("optimiser", c.optimiser, "steps, batch, rate");
 }
 
-class ShiftStage final : public Stage {
+class ShiftStage final : public SupervisedStage<TransferSampler> {
  public:
   using Config = ShiftStageConfig;
   static std::vector<std::string> reads(const Config&) { return {}; }
   ShiftStage(const Config& c, const StageInput& in)
-      : Stage("shift", c.optimiser, in.device),
+      : SupervisedStage("shift", c.optimiser, in),
         weight_(c.weight),
-        model_(add_network<TransferModel>(c.model, RngKey{in.seed, 0}, {{"points", "20"}})),
-        optimiser_(add_optimiser("optimiser", {"transfer"}, c.optimiser)),
-        sampler_(in.train, {.points = 20, .vertices = 40}, in.seed) {}
-  NamedValues step(int64_t step) override {
-    const int64_t n = examples_per_step();
-    const TransferBatch b = sampler_.batch(drawn(step) * n, n);
-    const Differentiated d =
-        differentiate(RngKey{1, static_cast<uint64_t>(step)}, [&](Context& ctx) {
-          const Var made = model_->forward(ctx, {b.pose, b.identity});
-          const Var loss = mean_all(geman_mcclure(smooth_length(made - Var(b.truth), 1e-8)));
-          return scale(loss, weight_);
-        });
-    optimiser_->step(d.gradients, learning_rate(optimisation_.schedule, step, steps()));
-    return {{"loss", d.loss}};
-  }
-  NamedTensors examples(int64_t step) const override {
-    return named_tensors(sampler_.batch(step, examples_per_step()));
+        model_(add_network<TransferModel>(c.model, RngKey{in.seed, 0}, {{"points", "20"}})) {
+    sampler_.emplace(in.train, TransferConfig{.points = 20, .vertices = 40}, in.seed);
+    begin({"transfer"});
   }
   NamedValues validate() override { return {{"loss", 0}}; }
 
  private:
+  Var loss(Context& ctx, const TransferBatch& b, int64_t, Tensor*) const override {
+    const Var made = model_->forward(ctx, {b.pose, b.identity});
+    const Var distances = smooth_length(made - Var(b.truth), 1e-8);
+    return scale(mean_all(geman_mcclure(distances)), weight_);
+  }
+
   double weight_;
   TransferModel* model_;
-  Optimiser* optimiser_;
-  TransferSampler sampler_;
 };
 
 /// Notes the first and the last loss, and how often the stage was validated.
@@ -219,9 +210,11 @@ bool trains_and_answers() {
   input.target = body.rest;
   input.target_name = body.id;
   const auto system = make_system(system_type("mine"), std::move(input));
-  const auto frames = system->push(body.rest.vertices, "a cloud");
-  return watch.last < 0.8 * watch.first && watch.validations > 0 && frames.size() == 1 &&
-         frames[0].vertices.size() == body.rest.vertices.size();
+  Points moved;
+  system->push(body.rest.vertices, "a cloud",
+               [&](const RetargetedFrame& f) { moved = f.vertices; });
+  return watch.last < 0.8 * watch.first && watch.validations > 0 &&
+         moved.size() == body.rest.vertices.size();
 }
 
 }  // namespace mine

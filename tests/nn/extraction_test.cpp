@@ -38,28 +38,29 @@ TEST(InferExtraction, RepeatsOfPointsDoNotMatterToTheLastBit) {
   const auto model = small("skeleton/point_transformer");
   for (const size_t n : {70u, 400u}) {
     Points points = cloud(n);
-    const Joints once = extract_joints(*model, points, "c", RngKey{3, 0}, 2);
+    const Joints once = extract_joints(*model, points, "c", RngKey{3, 0}, {.samples = 2});
     points.insert(points.begin(), 1000, points[7]);  // pixels without depth
-    EXPECT_EQ(extract_joints(*model, points, "c", RngKey{3, 0}, 2), once) << n;
+    EXPECT_EQ(extract_joints(*model, points, "c", RngKey{3, 0}, {.samples = 2}), once) << n;
   }
 }
 
 TEST(InferExtraction, PointsFarFromThePersonAreLeftOut) {
   const auto model = small("skeleton/patch_transformer");
   const Points points = cloud(400);
-  const Joints alone = extract_joints(*model, points, "c", RngKey{3, 0}, 2);
+  const Joints alone = extract_joints(*model, points, "c", RngKey{3, 0}, {.samples = 2});
   Points some = points;
   some.insert(some.begin() + 5, {{4000, 0, 0}, {0, -7, 0}, {1e30f, 1e30f, 0}});
-  EXPECT_EQ(extract_joints(*model, some, "c", RngKey{3, 0}, 2), alone);
+  EXPECT_EQ(extract_joints(*model, some, "c", RngKey{3, 0}, {.samples = 2}), alone);
   Points few = cloud(80);
-  const Joints of_few = extract_joints(*model, few, "c", RngKey{3, 0}, 2);
+  const Joints of_few = extract_joints(*model, few, "c", RngKey{3, 0}, {.samples = 2});
   few.push_back({50, 0, 0});
-  EXPECT_EQ(extract_joints(*model, few, "c", RngKey{3, 0}, 2), of_few);
+  EXPECT_EQ(extract_joints(*model, few, "c", RngKey{3, 0}, {.samples = 2}), of_few);
   for (int k = 0; k < 60; ++k) some.push_back({0, 0.01f * static_cast<float>(k), 6});
-  EXPECT_EQ(extract_joints(*model, some, "c", RngKey{3, 0}, 2), alone) << "one in seven";
+  EXPECT_EQ(extract_joints(*model, some, "c", RngKey{3, 0}, {.samples = 2}), alone)
+      << "one in seven";
   for (int k = 0; k < 60; ++k) some.push_back({0.01f * static_cast<float>(k), 0, 6});
   // Over a fifth: no mistakes of a sensor, and half a room.
-  EXPECT_NE(extract_joints(*model, some, "c", RngKey{3, 0}, 2), alone);
+  EXPECT_NE(extract_joints(*model, some, "c", RngKey{3, 0}, {.samples = 2}), alone);
 }
 
 TEST(InferExtraction, OrderOfPointsDoesNotMatterToTheLastBit) {
@@ -68,15 +69,17 @@ TEST(InferExtraction, OrderOfPointsDoesNotMatterToTheLastBit) {
     const auto model = small(name);
     for (const size_t n : {64u, 96u, 400u}) {  // repeated, all, chosen
       Points points = cloud(n);
-      const Joints first = extract_joints(*model, points, "c", RngKey{3, 0}, 2);
+      const Joints first = extract_joints(*model, points, "c", RngKey{3, 0}, {.samples = 2});
       for (uint64_t seed = 0; seed < 3; ++seed) {
         shuffle(points, seed);
-        EXPECT_EQ(extract_joints(*model, points, "c", RngKey{3, 0}, 2), first) << name << " " << n;
+        EXPECT_EQ(extract_joints(*model, points, "c", RngKey{3, 0}, {.samples = 2}), first)
+            << name << " " << n;
       }
-      EXPECT_NE(extract_joints(*model, cloud(n, 2), "c", RngKey{3, 0}, 2), first)
+      EXPECT_NE(extract_joints(*model, cloud(n, 2), "c", RngKey{3, 0}, {.samples = 2}), first)
           << name << " " << n;
       if (n == 96) continue;  // all of them, once: nothing to choose
-      EXPECT_NE(extract_joints(*model, points, "c", RngKey{4, 0}, 2), first) << name << " " << n;
+      EXPECT_NE(extract_joints(*model, points, "c", RngKey{4, 0}, {.samples = 2}), first)
+          << name << " " << n;
     }
   }
 }
@@ -114,7 +117,7 @@ TEST(InferExtraction, ViewsTogetherSeeTheWholeCloud) {
   Vec3 mean = Vec3::Zero();
   for (const Point& p : points) mean += p.cast<double>() / 256;
   for (uint64_t seed = 0; seed < 5; ++seed) {
-    const Joints joints = extract_joints(model, points, "c", RngKey{seed, 0}, 4);
+    const Joints joints = extract_joints(model, points, "c", RngKey{seed, 0}, {.samples = 4});
     EXPECT_LT((joints[0] - mean).norm(), 1e-6) << "every point is in one of the four views";
   }
 }
@@ -150,7 +153,7 @@ TEST(InferExtraction, ViewsAreTurnedBackAndWrongOnesOutvoted) {
                                       [](const auto& a, const auto& b) { return a.y() < b.y(); });
   for (const int views : {1, 2, 3, 4, 8, 16}) {
     for (model.wrong = 0; model.wrong <= (views < 8 ? 0 : views / 4); ++model.wrong) {
-      const Joints joints = extract_joints(model, points, "c", RngKey{9, 0}, views);
+      const Joints joints = extract_joints(model, points, "c", RngKey{9, 0}, {.samples = views});
       for (size_t j = 0; j < kJoints; ++j)
         EXPECT_LT((joints[j] - top.cast<double>()).norm(), 1e-5) << views << " " << model.wrong;
     }
@@ -186,8 +189,8 @@ TEST(InferExtraction, ViewsAgreeOnRotations) {
     const char* kind() const override { return "Pointing"; }
   } model;
   const Points points = cloud(64);
-  const SeenJoints one = JointExtractor(model, 1)(points, "c", RngKey{9, 0}),
-                   eight = JointExtractor(model, 8)(points, "c", RngKey{9, 0});
+  const SeenJoints one = JointExtractor(model)(points, "c", RngKey{9, 0}),
+                   eight = JointExtractor(model, {.samples = 8})(points, "c", RngKey{9, 0});
   for (size_t j = 0; j < kJoints; ++j) {
     EXPECT_LT(((*one.turns)[j] - (*eight.turns)[j]).norm(), 1e-5);
     EXPECT_NEAR((*one.turns)[j].determinant(), 1, 1e-9);
@@ -241,11 +244,11 @@ TEST(InferExtraction, PeopleOfAnySizeAreShownAsAdults) {
   for (const Point& p : adult) low = std::min(low, p.y()), high = std::max(high, p.y());
   for (Point& p : adult) p *= KnowsAdults::kHeight / (high - low);
   const RngKey key{9, 0};
-  const SeenJoints usual = JointExtractor(model, 1)(adult, "c", key);
+  const SeenJoints usual = JointExtractor(model)(adult, "c", key);
   for (const double size : {0.4, 0.5, 0.7, 1.0, 1.5, 2.0}) {
     Points points = adult;
     for (Point& p : points) p *= static_cast<float>(size);
-    JointExtractor any(model, 1, kAllAround, false, true);
+    JointExtractor any(model, {.any_size = true});
     model.looks = 0;
     const SeenJoints first = any(points, "c", key);
     if (size == 1) {
@@ -261,10 +264,9 @@ TEST(InferExtraction, PeopleOfAnySizeAreShownAsAdults) {
         EXPECT_NEAR((*seen->uncertainty)[j], size * std::exp(-3.0), 0.3 * size * std::exp(-3.0));
       }
     if (size != 1) {
-      EXPECT_GT(
-          (JointExtractor(model, 1)(points, "c", key).joints[kHead] - size * usual.joints[kHead])
-              .norm(),
-          0.01 * size);
+      EXPECT_GT((JointExtractor(model)(points, "c", key).joints[kHead] - size * usual.joints[kHead])
+                    .norm(),
+                0.01 * size);
     }
   }
 }
@@ -286,8 +288,8 @@ TEST(InferExtraction, MirroredViewsChangeSides) {
     const char* kind() const override { return "test"; }
   } model;
   const Points points = cloud(64);
-  const Joints one = extract_joints(model, points, "c", RngKey{9, 0}, 1),
-               two = extract_joints(model, points, "c", RngKey{9, 0}, 2);
+  const Joints one = extract_joints(model, points, "c", RngKey{9, 0}, {.samples = 1}),
+               two = extract_joints(model, points, "c", RngKey{9, 0}, {.samples = 2});
   EXPECT_GT(one[20].x(), one[21].x());
   for (size_t j = 0; j < kJoints; ++j) EXPECT_LT((one[j] - two[j]).norm(), 1e-5);
 }
@@ -318,7 +320,7 @@ TEST(InferExtraction, EveryViewRemembersTheFrameBefore) {
   for (size_t j = 0; j < kJoints; ++j)
     (*before.uncertainty)[j] = 0.001 * static_cast<double>(1 + j);
   for (const int views : {1, 2, 4, 8}) {
-    JointExtractor extractor(model, views);
+    JointExtractor extractor(model, {.samples = views});
     const SeenJoints seen = extractor(points, "c", RngKey{9, 0}, &before);
     for (size_t j = 0; j < kJoints; ++j) {
       EXPECT_LT((seen.joints[j] - before.joints[j]).norm(), 1e-5) << views;

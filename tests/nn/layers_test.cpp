@@ -36,6 +36,17 @@ struct Recurrent {
   }
 };
 
+TEST(Linear, HasItsActivationWithAndWithoutABias) {
+  const Tensor x = random({5, 6}, 2);
+  Context ctx;
+  for (const bool with_bias : {true, false}) {
+    const Linear layer(6, 4, Init{RngKey{5, 0}, DType::f64}, with_bias);
+    const Tensor plain = layer(ctx, x).value, positive = layer(ctx, x, Activation::relu).value;
+    EXPECT_TRUE(same_bits(positive, relu(Var(plain)).value)) << with_bias;
+    EXPECT_FALSE(same_bits(positive, plain)) << with_bias;
+  }
+}
+
 TEST(Conv1d, ValidTakesWholeWindowsOnly) {
   Conv1d layer(1, 1, 4, Init{RngKey{8, 0}, DType::f64});
   layer.weight.value = Tensor::from<double>({1, 1, 4}, {1, 10, 100, 1000});

@@ -5,6 +5,7 @@
 
 #include <cmath>
 
+#include "autograd/gradcheck/references.h"
 #include "autograd/ops/cross_attention.h"
 #include "autograd/ops/elementwise.h"
 #include "autograd/ops/layout.h"
@@ -140,6 +141,31 @@ TEST(TransferLosses, EdgesWithoutLengthGiveNoNan) {
              "faces is needed");
 }
 
+TEST(TransferLosses, AFaceWithACornerTwiceIsNone) {
+  const std::vector<int32_t> triangle = {0, 1, 2};
+  const Tensor reference = Tensor::from<double>({1, 3, 3}, {0, 0, 0, 1, 0, 0, 0, 1, 0});
+  const auto loss = [&](std::vector<int32_t> corners, std::vector<double>* gradient) {
+    const auto faces = static_cast<int64_t>(corners.size() / 3);
+    Tape tape;
+    const uint64_t id = Parameter::next_id();
+    const Var pred = tape.leaf(Tensor::from<double>({1, 3, 3}, {0, 0, 0, 2, 0, 0, 0, 2, 0}), id);
+    const Var out = edge_loss(pred, reference, Tensor::from<int32_t>({faces, 3}, corners));
+    *gradient = tape.backward(sum_all(out)).find(id)->to_vector<double>();
+    return out.value.item();
+  };
+  std::vector<double> alone, beside;
+  EXPECT_NEAR(loss(triangle, &alone), 3, 1e-9) << "all edges twice as long";
+  for (const std::array<int32_t, 3>& none :
+       {std::array{0, 1, 1}, {1, 0, 1}, {1, 1, 0}, {2, 2, 2}}) {
+    std::vector<int32_t> two = triangle;
+    two.insert(two.end(), none.begin(), none.end());
+    EXPECT_DOUBLE_EQ(loss(two, &beside), loss(triangle, &alone)) << none[0] << none[1] << none[2];
+    EXPECT_EQ(beside, alone);
+    two.assign(none.begin(), none.end());
+    EXPECT_EQ(loss(two, &beside), 0) << "no face at all";
+  }
+}
+
 TEST(TransferLosses, AnEdgeWithoutLengthInTheReferenceCountsAsRight) {
   const Tensor faces = Tensor::from<int32_t>({1, 3}, {0, 1, 2});
   const Tensor reference = Tensor::from<double>({1, 3, 3}, {0, 0, 0, 0, 0, 0, 1, 0, 0});
@@ -156,7 +182,8 @@ TEST(CrossAttentionMemory, GrowsWithThePointsAndNotWithTheirProduct) {
     reset_peak_memory();
     Tape tape;
     const Var leaf = tape.leaf(q, Parameter::next_id());
-    const Var y = blocks ? cross_attention(leaf, k, k) : cross_attention_reference(leaf, k, k);
+    const Var y =
+        blocks ? cross_attention(leaf, k, k) : gradcheck::cross_attention_reference(leaf, k, k);
     tape.backward(sum_all(y));
     return memory_stats().peak - before;
   };

@@ -1,11 +1,12 @@
 // The full-size networks with formula-made weights (spec 11): the same outputs as PyTorch's, number
 // by number and in the specification's checksums, the same order of parameters, the counts of the
-// papers; and fifty steps of Adam.
+// papers; and fifty steps of Adam in both precisions.
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <sstream>
 
+#include "autograd/kernels/update.h"
 #include "autograd/ops/elementwise.h"
 #include "autograd/ops/points.h"
 #include "autograd/ops/reduce.h"
@@ -15,6 +16,7 @@
 #include "nn/models/skeleton.h"
 #include "nn/models/smrm.h"
 #include "nn/weights/safetensors.h"
+#include "tests/support/emulated_gpu.h"
 #include "train/optim/adam.h"
 
 namespace restage {
@@ -210,13 +212,15 @@ struct Vector7 : Module {
   const char* kind() const override { return "Vector"; }
 };
 
-TEST(OracleAdam, FiftyStepsInThreeSettings) {
+std::map<std::string, AdamConfig> adam_settings() {
   AdamConfig beta, decay;
   beta.beta1 = 0.5;
   decay.weight_decay = 1e-2;
-  const std::map<std::string, AdamConfig> settings = {
-      {"default", {}}, {"beta05", beta}, {"decay", decay}};
-  for (const auto& [name, config] : settings) {
+  return {{"default", {}}, {"beta05", beta}, {"decay", decay}};
+}
+
+TEST(OracleAdam, FiftyStepsInThreeSettings) {
+  for (const auto& [name, config] : adam_settings()) {
     Vector7 model;
     Adam adam(named_parameters({{"", &model}}), config);
     for (uint32_t i = 0; i < 50; ++i) {
@@ -230,6 +234,34 @@ TEST(OracleAdam, FiftyStepsInThreeSettings) {
         ASSERT_NEAR(model.w.value.item(k), want.item(k), 1e-12) << step;
     }
   }
+}
+
+/// Fifty steps of the kernel in float32, by the gradients of tests/golden/make_adam_f32.py.
+void expect_adam_f32(const std::string& name, const AdamConfig& c, Device device) {
+  const auto numbers = [&](uint32_t tag) {
+    return hash_fill({7}, tag).cast(DType::f32).to(device);
+  };
+  Tensor w = numbers(3), m = Tensor::zeros({7}, DType::f32, device), v = m.clone();
+  const auto want = [&](const std::string& of) { return golden("adam_f32").at(of, "adam_f32"); };
+  for (int i = 0; i < 50; ++i) {
+    launch(AdamArgs{numbers(10 + static_cast<uint32_t>(i)), w, m, v, 1e-2, c.beta1, c.beta2, c.eps,
+                    c.weight_decay, 1, i + 1});
+    const std::string step = name + "." + std::to_string(i);
+    for (int64_t k = 0; k < 7; ++k) ASSERT_NEAR(w.cpu().item(k), want(step).item(k), 2e-6) << step;
+  }
+  for (int64_t k = 0; k < 7; ++k) {
+    EXPECT_NEAR(m.cpu().item(k), want(name + ".m").item(k), 1e-7) << name;
+    // What kernels/update.h says of 1 - beta2.
+    EXPECT_NEAR(v.cpu().item(k) / want(name + ".v").item(k) - 1, -1.29e-5, 1e-6) << name;
+  }
+}
+
+TEST(OracleAdam, InFloat32ItIsAsNearAsItsHeaderSays) {
+  for (const auto& [name, config] : adam_settings())
+    for (const Device device : {Device{}, emulated_gpu()}) {
+      SCOPED_TRACE(name_of(device));
+      expect_adam_f32(name, config, device);
+    }
 }
 
 }  // namespace

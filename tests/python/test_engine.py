@@ -256,6 +256,7 @@ def test_ops_are_right():
     assert np.array_equal(ops.concat([x] * 20, 0).numpy(), np.concatenate([x] * 20))
     assert np.array_equal(ops.permute(x, (1, 0)).numpy(), x.T) and ops.reshape(x, -1).shape == (20,)
     assert np.array_equal(ops.slice(x, 1, 1, 3).numpy(), x[:, 1:3])
+    assert [p.numpy().tolist() for p in ops.split(x, 1, [2, 3])] == [x[:, :2].tolist(), x[:, 2:].tolist()]
     q, k, v = f32(1, 3, 4), f32(1, 6, 4), f32(1, 6, 2)
     e = np.exp(q @ k.transpose(0, 2, 1))
     assert np.allclose(ops.cross_attention(q, k, v).numpy(), e / e.sum(-1, keepdims=True) @ v, atol=1e-5)

@@ -28,7 +28,7 @@ def test_the_programs_line(program, walk):
          lambda: restage.retarget(walk / "target.ply", walk / "target.ply", out="r.xyz")),
         (["doctor", "no.ply"], lambda: restage.doctor("no.ply")),
         (["train", "no.yaml"], lambda: restage.command("train", "no.yaml")),
-        (["skeleton", "--weights", LITE, "--input", "no"], lambda: restage.command("skeleton", weights=LITE, input="no")),
+        (["skeleton", "--weights", LITE, "--source", "no"], lambda: restage.command("skeleton", weights=LITE, source="no")),
     ]:
         told = program(*words)
         assert told.returncode == 2
@@ -88,7 +88,7 @@ def test_clouds_whose_z_points_up(walk):
     for cloud in lying[:7]:
         system.push(cloud)
     for _ in range(2):
-        with pytest.raises(restage.InputError, match="give --source-up z"):
+        with pytest.raises(restage.InputError, match="give source_up z"):
             system.push(lying[7])
     upright = restage.System(walk / "target.ply", LITE, samples=1, source_up="z")
     forced = restage.System(walk / "target.ply", LITE, samples=1, force=True)

@@ -75,6 +75,34 @@ def test_none_is_a_missing_frame(walk, source, truth):
         restage.retarget([None, None], walk / "target.ply", LITE)
 
 
+def test_a_cloud_without_points_is_a_missing_frame(walk, source, truth):
+    for empty in (np.zeros((0, 3), np.float32), np.full((70, 3), np.nan)):
+        clouds = restage.load_clouds(source)
+        clouds[2] = empty
+        result = restage.retarget(clouds, walk / "target.ply", LITE)
+        assert result.filled == [2] and [m["frame"] for m in result.report["missing"]] == [2]
+        assert result.report["points_left_out"] == len(empty)
+        assert np.array_equal(result.vertices[:2], truth[0]["vertices"][:2])
+
+
+def test_missing_numbers_are_counted(walk, source, truth):
+    clouds = restage.load_clouds(source)
+    clouds[1] = np.concatenate([clouds[1], np.float32([[np.nan, 0, 0], [0, np.inf, 0], [0, 0, -np.inf]])])
+    result = restage.retarget(clouds, walk / "target.ply", LITE)
+    same(result, truth[0])
+    assert result.report["points_left_out"] == 3
+    system = restage.System(walk / "target.ply", LITE)
+    assert sum(len(system.push_all(cloud)) for cloud in clouds) == len(clouds)
+    assert system.points_left_out == 3
+
+
+def test_points_far_from_all_others_are_left_out(walk, source, truth):
+    system = restage.System(walk / "target.ply", LITE)
+    clouds = [np.concatenate([cloud, np.float32([[40, 3, -20]])]) for cloud in restage.load_clouds(source)]
+    frames = [f for cloud in clouds for f in system.push_all(cloud)]
+    assert np.array_equal([f.joints for f in frames], truth[0]["joints"])
+
+
 def test_push(walk, source, truth):
     system = restage.System(walk / "target.ply", LITE)
     frames = [f for cloud in restage.load_clouds(source) for f in system.push_all(cloud)] + system.finish()

@@ -30,6 +30,8 @@ TEST(CodesStage, GivesTheSameBitsWithAnyNumberOfThreads) {
   expect_the_same_bits("codes", tiny_codes(6));
 }
 
+TEST(CodesStage, ValidationsLookAtSignals) { expect_validation_to_stop("codes", tiny_codes(1)); }
+
 TEST(CodesStage, StateGoesThroughAFile) { expect_to_resume("codes", tiny_codes(6)); }
 
 TEST(CodesStage, IsAsLargeAsTheDataAskFor) {

@@ -101,7 +101,7 @@ std::vector<std::string> all_ids(const std::string& yaml) {
 
 TEST(Identity, IsWhatItWasBeforeKeysWereAdded) {
   // As the program gave them before heads, scales and other sizes of models became keys; results
-  // that are kept by id (experiments/*/results, stores on disks) are found by them.
+  // that are kept by id (experiments/studies/*/results, stores on disks) are found by them.
   EXPECT_EQ(all_ids("name: a\nseed: 5\n"),
             (std::vector<std::string>{"skeleton-b1e92605893d", "motion-a147f27e1ec3",
                                       "deformation-4a59121e61fc", "d9079e8e360f"}));

@@ -7,10 +7,16 @@
 #include <Eigen/SVD>
 #include <cmath>
 
+#include "autograd/base/atomic_file.h"
+#include "autograd/base/log.h"
 #include "autograd/base/rng.h"
 #include "autograd/gradcheck/evaluate.h"
 #include "nn/layers/linear.h"
+#include "tests/support/errors.h"
+#include "tests/support/files.h"
 #include "tests/train/tiny_training.h"
+#include "train/stages/transfer_stage.h"
+#include "train/trainer.h"
 
 namespace restage {
 namespace {
@@ -70,6 +76,11 @@ TEST(Muon, TakesMatricesOnly) {
   EXPECT_FALSE(takes({40, 3}));
   EXPECT_FALSE(takes({64}));
   EXPECT_FALSE(takes({64, 64, 3}));
+  // The weights of PyTorch's 1x1 convolutions are matrices, too.
+  EXPECT_TRUE(takes({32, 40, 1}));
+  EXPECT_TRUE(takes({32, 40, 1, 1}));
+  EXPECT_FALSE(takes({31, 40, 1}));
+  EXPECT_FALSE(takes({1, 64, 64}));
 }
 
 TEST(Muon, StepsAlongTheOrthogonalisedMomentumByAdamsSize) {
@@ -90,6 +101,62 @@ TEST(Muon, StepsAlongTheOrthogonalisedMomentumByAdamsSize) {
     EXPECT_LT((matrix_of(layer.weight.value) - (w - step)).norm(), 1e-12);
     EXPECT_NEAR(step.norm() / std::sqrt(40 * 64), rate * config.step, 0.2 * rate * config.step);
     w = matrix_of(layer.weight.value);
+  }
+}
+
+/// A weight moves alike, whatever axes of one follow, beside others of its shape or alone.
+TEST(Muon, MovesConvolutionsAsMatrices) {
+  const auto moved = [](const std::vector<int>& tails) {
+    std::vector<std::unique_ptr<Linear>> layers;
+    std::vector<std::pair<std::string, Module*>> modules;
+    for (const int tail : tails) {
+      layers.push_back(
+          std::make_unique<Linear>(64, 40, Init{RngKey{1, 0}, DType::f64}, false, tail));
+      modules.emplace_back("layer" + std::to_string(layers.size()) + ".", layers.back().get());
+    }
+    const auto named = named_parameters(modules);
+    Muon muon(named, {}), resumed(named, {});
+    TensorFile file;
+    for (uint64_t i = 0; i < 2; ++i) {
+      Gradients g;
+      for (const auto& layer : layers)
+        g.set(layer->weight.id, random_matrix(40, 64, 10 + i).reshape(layer->weight.value.shape()));
+      (i == 0 ? muon : resumed).step(g, 1e-2, 1);
+      muon.save("", file);
+      resumed.load("", file, "file");
+    }
+    EXPECT_EQ(file.tensors.at("layer1.weight.m").shape(), layers[0]->weight.value.shape());
+    std::vector<std::vector<double>> out;
+    for (const auto& layer : layers) out.push_back(layer->weight.value.to_vector<double>());
+    return out;
+  };
+  const std::vector<double> plain = moved({0})[0];
+  for (const std::vector<int>& tails : {std::vector{1}, {2}, {0, 1, 2}})
+    for (const auto& weight : moved(tails)) EXPECT_EQ(weight, plain);
+}
+
+/// What a stage of one of the systems without a skeleton leaves to Adam, and what the log says.
+TEST(Muon, TakesMostOfTheSystemsThatAreMadeOfConvolutions) {
+  for (const std::string model : {"transfer/npt", "transfer/lart", "transfer/corenet"}) {
+    TrainConfig config;
+    auto& stage_config = config.section("transfer").config.as<TransferStageConfig>();
+    const bool deep = model == "transfer/corenet";
+    testing::choose(stage_config.model, model,
+                    {deep ? "widths=[32, 64, 64]" : "widths=[32, 64, 125]"});
+    if (deep) testing::resize(stage_config.model, {"generator=[64, 64, 32]", "blocks=1"});
+    stage_config.pairs.points = 32;
+    stage_config.optimiser.kind = OptimiserConfig::Kind::muon;
+    const auto stage = testing::tiny_stage("transfer", config);
+    TensorFile file;
+    stage->save(file);
+    int64_t matrices = 0, others = 0;
+    for (const auto& [name, value] : file.tensors)
+      if (name.starts_with("optimiser.") && name.ends_with(".m"))
+        (file.find(name.substr(0, name.size() - 1) + "v") == nullptr ? matrices : others) +=
+            value.numel();
+    EXPECT_GT(matrices, 3 * others) << model;
+    EXPECT_EQ(stage->optimised().muon, matrices) << model;
+    EXPECT_EQ(stage->optimised().adam, others) << model;
   }
 }
 
@@ -116,6 +183,36 @@ TEST(Muon, LeavesTheRestOfANetworkToAdam) {
   }
   EXPECT_GT(others, 10);
   EXPECT_GT(matrices, 4);
+}
+
+class MuonLog : public test::FileTest {
+ protected:
+  void SetUp() override { set_log_level(LogLevel::quiet); }
+  void TearDown() override { set_log_level(LogLevel::info); }
+  /// The log of a step of training.
+  std::string log_of(const std::string& name, TrainConfig config) {
+    for (OptimiserConfig* o : testing::optimisers(config)) {
+      o->steps = 1;
+      o->kind = OptimiserConfig::Kind::muon;
+    }
+    RunDir run = RunDir::create_at(dir / name, "x: 1\n", "{}\n", {name});
+    train(run, {name}, {},
+          [&](const std::string&, Bundle*) { return testing::tiny_stage(name, config); },
+          {.quiet = true});
+    return read_file(run.dir() + "/log.txt");
+  }
+};
+
+TEST_F(MuonLog, SaysHowManyNumbersEachMoves) {
+  TrainConfig config = testing::tiny_training(1);
+  const OptimisedNumbers n = testing::tiny_stage("skeleton", config)->optimised();
+  EXPECT_HAS(log_of("skeleton", config),
+             "Muon moves " + std::to_string(n.muon) + " numbers, Adam " + std::to_string(n.adam));
+  // Matrices of fewer than 32 rows are none of Muon's.
+  testing::resize(testing::deformation(config).model, {"width=16"});
+  const std::string none = log_of("deformation", config);
+  EXPECT_HAS(none, "warning: deformation: Muon moves 0 numbers");
+  EXPECT_HAS(none, "32 rows and columns");
 }
 
 }  // namespace

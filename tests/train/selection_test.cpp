@@ -14,7 +14,9 @@
 #include "autograd/base/interrupt.h"
 #include "autograd/base/log.h"
 #include "nn/config/config.h"
+#include "tests/support/errors.h"
 #include "tests/support/files.h"
+#include "tests/support/handled_signals.h"
 #include "tests/train/tiny_training.h"
 #include "train/trainer.h"
 
@@ -30,47 +32,59 @@ const double kNaN = std::numeric_limits<double>::quiet_NaN();
 const TrainOptions kQuietOptions{
     .precision = MatmulPrecision::float32, .quiet = true, .observers = {}};
 
+/// When a signal comes: before a step, or in the validation after so many steps; -1: never.
+struct Stop {
+  int64_t step = -1, validation = -1;
+};
+
 /// A stage whose validations, one every two steps, say what the test wants; a signal may come.
 class Scripted final : public Forwarding {
  public:
-  Scripted(std::vector<double> scores, int64_t stop_at)
+  Scripted(std::vector<double> scores, Stop stop)
       : Forwarding(tiny_stage("deformation", tiny_training(kSelectionSteps))),
         scores_(std::move(scores)),
-        stop_at_(stop_at) {}
+        stop_(stop) {}
   NamedValues step(int64_t step) override {
-    if (step == stop_at_) ::raise(SIGTERM);
+    if (step == stop_.step) ::raise(SIGTERM);
     done_ = step + 1;
     return Forwarding::step(step);
   }
+  void save(TensorFile& file) const override {
+    Forwarding::save(file);
+    file.tensors["scripted.done"] = Tensor::from<int64_t>({1}, {done_});
+  }
+  void load(const TensorFile& file, const std::string& where) override {
+    Forwarding::load(file, where);
+    done_ = file.at("scripted.done", where).data<int64_t>()[0];
+  }
   NamedValues validate() override {
+    if (done_ == stop_.validation) ::raise(SIGTERM);
+    throw_if_stopped();
     const int64_t at = done_ / 2 - (started_from_weights() ? 0 : 1);
     return {{"other", 1}, {"figure", scores_[static_cast<size_t>(at)]}};
   }
 
  private:
   std::vector<double> scores_;
-  int64_t stop_at_, done_ = 0;
+  Stop stop_;
+  int64_t done_ = 0;
 };
 
 class TrainSelection : public test::FileTest {
  protected:
   void SetUp() override {
     set_log_level(LogLevel::quiet);
-    handle_signals();
     loop_.log_every = 100;
     loop_.validate_every = 2;
     loop_.checkpoint_every = 5;
     loop_.selection.monitor = {"deformation.figure"};
   }
-  void TearDown() override {
-    for (const int number : {SIGINT, SIGTERM, SIGPIPE}) ::signal(number, SIG_DFL);
-    set_log_level(LogLevel::info);
-  }
+  void TearDown() override { set_log_level(LogLevel::info); }
 
   /// Weights after a training in a new folder, or in one that is there.
-  std::string trained(RunDir&& run, const std::vector<double>& scores, int64_t stop_at = -1) {
+  std::string trained(RunDir&& run, const std::vector<double>& scores, Stop stop = {}) {
     const MakeStage make = [&](const std::string&, Bundle*) {
-      auto stage = std::make_unique<Scripted>(scores, stop_at);
+      auto stage = std::make_unique<Scripted>(scores, stop);
       if (fine_tuning_) stage->start_from({}, {}, "given weights");
       return stage;
     };
@@ -81,6 +95,17 @@ class TrainSelection : public test::FileTest {
   }
   std::string trained(const std::string& name, const std::vector<double>& scores) {
     return trained(create(name), scores);
+  }
+  /// Stopped by a signal and resumed by a new process, it ends as the undisturbed training `whole`,
+  /// whose weights are `weights`.
+  void expect_completes(const std::string& whole, const std::string& weights,
+                        const std::vector<double>& scores, Stop stop) {
+    const int64_t when = std::max(stop.step, stop.validation);
+    const std::string name = (stop.step < 0 ? "validation" : "step") + std::to_string(when);
+    EXPECT_THROW(trained(create(name), scores, stop), Interrupted) << name;
+    handle_signals();
+    EXPECT_TRUE(trained(RunDir::resume(dir / name, {"deformation"}), scores) == weights) << name;
+    EXPECT_EQ(metrics(name), metrics(whole)) << name;
   }
   std::string metrics(const std::string& name) { return read_file(dir / name + "/metrics.jsonl"); }
 
@@ -99,6 +124,7 @@ class TrainSelection : public test::FileTest {
     return safetensors_bytes(file);
   }
 
+  const test::HandledSignals handled_;
   LoopConfig loop_;
   bool fine_tuning_ = false;
 };
@@ -132,12 +158,8 @@ TEST_F(TrainSelection, FineTuningThatMakesWorseHandsOnWhatItBeganWith) {
   EXPECT_EQ(metrics("worse").find("\"step\":0,"), 1u) << metrics("worse").substr(0, 60);
   const std::string other = trained("better", better);
   EXPECT_TRUE(tensors_of(other) == weights_at("better", 4));
-  for (const int64_t when : {0, 1, 5, 9}) {
-    const std::string name = "stopped" + std::to_string(when);
-    EXPECT_THROW(trained(create(name), worse, when), Interrupted);
-    EXPECT_TRUE(trained(RunDir::resume(dir / name, {"deformation"}), worse) == got) << when;
-    EXPECT_EQ(metrics(name), metrics("worse")) << when;
-  }
+  for (const int64_t when : {0, 1, 5, 9}) expect_completes("worse", got, worse, {.step = when});
+  for (const int64_t when : {0, 2, 12}) expect_completes("worse", got, worse, {.validation = when});
 }
 
 TEST_F(TrainSelection, PatienceEndsAStage) {
@@ -167,7 +189,7 @@ TEST_F(TrainSelection, AnAverageIsHandedOnAndTheWeightsGoOn) {
   for (int64_t t = 1; t <= kSelectionSteps; ++t) {
     const Tensor w = tensor("plain", t, key);
     if (expected.empty()) {  // as it was before the first step
-      const Scripted untrained({}, -1);
+      const Scripted untrained({}, Stop{});
       for (const StateEntry& entry : untrained.weights())
         if (entry.name == key)
           expected.assign(entry.value->data<float>(), entry.value->data<float>() + w.numel());
@@ -192,15 +214,44 @@ TEST_F(TrainSelection, StoppedAnywhereItEndsAsUndisturbed) {
   loop_.selection.ema = 0.9;
   const std::vector<double> scores = {5, 3, 4, 3.5, 3.2, 6};
   const std::string whole = trained("whole", scores);
-  for (int64_t when = 0; when < 10; ++when) {
-    const std::string name = "stopped" + std::to_string(when);
-    EXPECT_THROW(trained(create(name), scores, when), Interrupted);
-    RunDir again = RunDir::resume(dir / name, {"deformation"});
-    EXPECT_TRUE(trained(std::move(again), scores) == whole) << when;
-    EXPECT_EQ(metrics(name), metrics("whole")) << when;
-  }
+  for (int64_t when = 0; when < 10; ++when)
+    expect_completes("whole", whole, scores, {.step = when});
+  for (int64_t when = 2; when <= 10; when += 2)
+    expect_completes("whole", whole, scores, {.validation = when});
   // and one that had ended already
   EXPECT_TRUE(trained(RunDir::resume(dir / "whole", {"deformation"}), scores) == whole);
+}
+
+/// The figures that a stage says it measures are those of its validation, and no others can be
+/// monitored.
+TEST(TrainConfigLoop, MonitorsWhatTheConfigurationMeasures) {
+  const auto monitoring = [](TrainConfig config, const std::string& figure) {
+    config.loop.selection.monitor = {figure};
+    return config;
+  };
+  TrainConfig plain = tiny_training(4), all = plain;
+  testing::deformation(plain).offsets = false;
+  testing::resize(testing::skeleton(plain).model, {"uncertainty=false"});
+  CloudConfig& clouds = testing::skeleton(all).clouds;
+  clouds.one_camera = clouds.camera_ring = clouds.intruder = 0.1;
+  testing::resize(testing::skeleton(all).model, {"orientation=true"});
+  for (const TrainConfig& config : {plain, all})
+    for (const std::string name : {"skeleton", "motion", "deformation"}) {
+      const auto stage = tiny_stage(name, config);
+      std::vector<std::string> measured;
+      for (const auto& figure : stage->validate()) measured.push_back(figure.first);
+      EXPECT_EQ(stage->figures(), measured) << name;
+      for (const std::string& figure : stage_type(name).figures) {
+        const bool there = std::find(measured.begin(), measured.end(), figure) != measured.end();
+        const std::string refused =
+            test::refusal_of([&] { tiny_stage(name, monitoring(config, name + "." + figure)); });
+        EXPECT_EQ(refused.empty(), there) << name << "." << figure << ": " << refused;
+        if (there) continue;
+        EXPECT_HAS(refused, "loop.monitor");
+        EXPECT_HAS(refused, "'" + name + "." + figure + "'");
+        EXPECT_HAS(refused, name + "." + measured[0]);
+      }
+    }
 }
 
 TEST(TrainConfigLoop, MonitorsNamedFiguresOnly) {

@@ -22,6 +22,9 @@ namespace {
 
 using testing::choose;
 using testing::deformation;
+using testing::expect_the_same_bits;
+using testing::expect_to_resume;
+using testing::expect_validation_to_stop;
 using testing::motion;
 using testing::optimisers;
 using testing::resize;
@@ -87,6 +90,10 @@ TEST(TrainStages, AnotherSeedGivesOtherBits) {
     EXPECT_TRUE(examples(*x) == examples(*y)) << name;
     EXPECT_FALSE(examples(*x) == examples(*z)) << name;
   }
+}
+
+TEST(TrainStages, ValidationsLookAtSignals) {
+  for (const std::string name : kStageNames) expect_validation_to_stop(name, tiny_training(2));
 }
 
 TEST(TrainStages, StateGoesThroughAFile) {

@@ -14,7 +14,7 @@
 #include "nn/models/discriminator.h"
 #include "nn/models/smrm.h"
 #include "tests/support/errors.h"
-#include "tests/train/tiny_training.h"
+#include "tests/train/tiny_codes.h"
 #include "train/team.h"
 
 namespace restage {
@@ -45,6 +45,7 @@ struct Table {
   }
   std::vector<std::vector<std::vector<float>>> rows;      // of each rank
   std::vector<std::vector<std::vector<double>>> numbers;  // of each rank
+  size_t width = 0;                                       // of the last sum's rows
 };
 
 class Thread final : public Team {
@@ -53,7 +54,10 @@ class Thread final : public Team {
   int rank() const override { return rank_; }
   int size() const override { return table_->size; }
   int local_rank() const override { return rank_; }
-  std::unique_ptr<Sum> sum(size_t) override { return std::make_unique<Rows>(table_, rank_); }
+  std::unique_ptr<Sum> sum(size_t width) override {
+    table_->width = width;
+    return std::make_unique<Rows>(table_, rank_);
+  }
   std::vector<std::vector<double>> all(const std::vector<std::vector<double>>& mine) override {
     table_->numbers[static_cast<size_t>(rank_)] = mine;
     table_->wait();
@@ -234,6 +238,30 @@ TEST(Team, BuffersThatNobodyChangesStayAsTheyAre) {
   };
   ASSERT_FALSE(constants(0).empty());
   EXPECT_TRUE(constants(0) == constants(2));
+}
+
+/// A step adds up the parameters that are optimised and the buffers that steps change, each with a
+/// flag. A body and a basis of motions, which H4D keeps as buffers, are larger than its network.
+TEST(Team, BuffersThatNobodyChangesDoNotTravel) {
+  TrainConfig norms = tiny_training(6);
+  choose(skeleton(norms).model, "skeleton/pointnet", {"points=64"});
+  for (const auto& [name, config] :
+       {std::pair{"codes", testing::tiny_codes(6)}, {"skeleton", norms}}) {
+    Table table(1);
+    const std::lock_guard turn(table.turn);
+    Thread team(&table, 0);
+    const auto stage = tiny_stage(name, config);
+    stage->cut_steps(2, team);
+    stage->step(0);
+    size_t travel = 0, stay = 0, change = 0;
+    for (const StateEntry& entry : stage->weights()) {
+      const size_t numbers = 1 + static_cast<size_t>(entry.value->numel());
+      (entry.parameter != nullptr || entry.changes ? travel : stay) += numbers;
+      change += entry.changes ? numbers : 0;
+    }
+    EXPECT_EQ(table.width, travel) << name;
+    EXPECT_GT(stay + change, 100u) << name;
+  }
 }
 
 /// A stage whose micro-batches do not all take the same part: what each of them does is given.

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include "autograd/base/interrupt.h"
 #include "tests/support/tiny_body.h"
 #include "tests/support/use_set.h"
 #include "train/stages/deformation_stage.h"
@@ -127,6 +128,18 @@ inline void expect_to_resume(const std::string& name, const TrainConfig& config)
   EXPECT_TRUE(result_bytes(*resumed) == bytes) << name;
   for (int64_t i = half; i < all; ++i) resumed->step(i);
   EXPECT_TRUE(result_bytes(*resumed) == result_bytes(*straight)) << name;
+}
+
+/// A validation ends early where somebody asks to stop, and leaves no trace.
+inline void expect_validation_to_stop(const std::string& name, const TrainConfig& config) {
+  const auto stage = tiny_stage(name, config);
+  const NamedValues whole = stage->validate();
+  {
+    const StopScope scope;
+    ask_to_stop();
+    EXPECT_THROW(stage->validate(), Interrupted) << name;
+  }
+  EXPECT_EQ(stage->validate(), whole) << name;
 }
 
 inline OptimiserConfig optimiser_of(const Stage& stage) {

@@ -16,6 +16,7 @@
 #include "autograd/gradcheck/evaluate.h"
 #include "nn/layers/linear.h"
 #include "tests/support/files.h"
+#include "tests/support/handled_signals.h"
 #include "tests/train/tiny_training.h"
 #include "train/optim/optimiser.h"
 
@@ -46,20 +47,29 @@ class Disturbed final : public Forwarding {
   std::function<void()> what_;
 };
 
+/// A signal comes at the beginning of one of its validations.
+class SignalledValidation final : public Forwarding {
+ public:
+  SignalledValidation(std::unique_ptr<Stage> stage, int number)
+      : Forwarding(std::move(stage)), number_(number) {}
+  NamedValues validate() override {
+    if (number_-- == 0) ::raise(SIGTERM);
+    return Forwarding::validate();
+  }
+
+ private:
+  int number_;
+};
+
 struct Killed : std::runtime_error {
   Killed() : std::runtime_error("killed") {}
 };
 
 class TrainTrainer : public test::FileTest {
  protected:
-  void SetUp() override {
-    set_log_level(LogLevel::quiet);
-    handle_signals();
-  }
-  void TearDown() override {
-    for (const int number : {SIGINT, SIGTERM, SIGPIPE}) ::signal(number, SIG_DFL);
-    set_log_level(LogLevel::info);
-  }
+  const test::HandledSignals handled_;
+  void SetUp() override { set_log_level(LogLevel::quiet); }
+  void TearDown() override { set_log_level(LogLevel::info); }
   RunDir create(const std::string& name) const {
     return RunDir::create_at(dir / name, "x: 1\n", "{}\n", kAll);
   }
@@ -94,6 +104,16 @@ class TrainTrainer : public test::FileTest {
       result.metrics = metrics("whole");
     }
     return result;
+  }
+  /// Trains until it is stopped by a signal; then it is as in a new process.
+  void expect_stopped(RunDir&& run, const MakeStage& make, const TrainOptions& options = kQuiet) {
+    try {
+      train(run, kAll, loop(), make, options);
+      ADD_FAILURE() << run.dir() << " is not stopped";
+    } catch (const Interrupted& stopped) {
+      EXPECT_EQ(stopped.exit_code, 143) << run.dir();
+    }
+    handle_signals();
   }
   /// Resumes `name`, which must then be the same as the undisturbed training.
   void expect_completes(const std::string& name) {
@@ -132,21 +152,74 @@ TEST_F(TrainTrainer, CheckpointsAreLeftAtTheEndsOfStages) {
 
 TEST_F(TrainTrainer, StopByASignalWritesACheckpointAndResumesToTheSameBits) {
   for (const std::string& stage : kAll) {
-    {
-      RunDir run = create(stage);
-      try {
-        train(run, kAll, loop(), disturbed(stage, 5, [] { ::raise(SIGTERM); }), kQuiet);
-        FAIL() << "not stopped in " << stage;
-      } catch (const Interrupted& stopped) {
-        EXPECT_EQ(stopped.exit_code, 143);
-      }
-    }
+    expect_stopped(create(stage), disturbed(stage, 5, [] { ::raise(SIGTERM); }));
     const auto last = latest_checkpoint(dir / stage, kAll);
     ASSERT_TRUE(last) << stage;
     EXPECT_EQ(last->stage, stage);
     EXPECT_EQ(last->step, 6);  // the step in which the signal came is finished
     expect_completes(stage);
   }
+}
+
+/// Slurm's warning may come at any moment, also when a stage has done its last step.
+TEST_F(TrainTrainer, AStopInTheLastCheckpointOfAStageEndsTheTraining) {
+  struct Signal final : TrainObserver {
+    void on_checkpoint(const Stage& stage, int64_t done, const std::string&) override {
+      if (stage.name() == which && done == kSteps) ::raise(SIGTERM);
+    }
+    std::string which;
+  } signal;
+  TrainOptions options = kQuiet;
+  options.observers = {&signal};
+  for (const std::string& stage : kAll) {
+    signal.which = stage;
+    expect_stopped(create(stage), plain(), options);
+    const auto last = latest_checkpoint(dir / stage, kAll);
+    ASSERT_TRUE(last) << stage;
+    EXPECT_EQ(last->stage, stage);
+    EXPECT_EQ(last->step, kSteps);
+    expect_completes(stage);
+  }
+}
+
+TEST_F(TrainTrainer, AStopLeavesAValidationUnfinishedAndItIsMadeUpLater) {
+  for (const std::string& which : kAll)
+    for (const int number : {0, 1}) {
+      const std::string name = which + std::to_string(number);
+      expect_stopped(create(name),
+                     [&](const std::string& stage, Bundle*) -> std::unique_ptr<Stage> {
+                       auto out = tiny_stage(stage, tiny_training(kSteps));
+                       if (stage != which) return out;
+                       return std::make_unique<SignalledValidation>(std::move(out), number);
+                     });
+      const auto last = latest_checkpoint(dir / name, kAll);
+      ASSERT_TRUE(last) << name;
+      EXPECT_EQ(last->stage, which);
+      EXPECT_EQ(last->step, number == 0 ? 5 : kSteps);
+      // All lines up to the one of that validation.
+      ASSERT_TRUE(whole().metrics.starts_with(metrics(name))) << metrics(name);
+      const std::string missing = whole().metrics.substr(metrics(name).size());
+      EXPECT_EQ(missing.substr(0, missing.find('\n')).find("\"loss\""), std::string::npos)
+          << missing;
+      expect_completes(name);
+    }
+}
+
+TEST_F(TrainTrainer, AStageOfNoStepsMayBeStoppedInItsValidation) {
+  const auto make = [](int number) -> MakeStage {
+    return [number](const std::string& stage, Bundle*) -> std::unique_ptr<Stage> {
+      auto out = tiny_stage(stage, tiny_training(stage == "skeleton" ? 0 : kSteps));
+      if (stage != "skeleton") return out;
+      return std::make_unique<SignalledValidation>(std::move(out), number);
+    };
+  };
+  RunDir undisturbed = create("undisturbed");
+  const std::string got = weights(train(undisturbed, kAll, loop(), make(-1), kQuiet));
+  expect_stopped(create("stopped"), make(0));
+  EXPECT_EQ(metrics("stopped"), "");
+  RunDir again = RunDir::resume(dir / "stopped", kAll);
+  EXPECT_TRUE(weights(train(again, kAll, loop(), make(-1), kQuiet)) == got);
+  EXPECT_EQ(metrics("stopped"), metrics("undisturbed"));
 }
 
 /// Notes the precision of products in steps and validations.
@@ -252,6 +325,7 @@ TEST_F(TrainTrainer, TwoStopsInARow) {
     EXPECT_THROW(
         train(run, kAll, loop(), disturbed("motion", when, [] { ::raise(SIGINT); }), kQuiet),
         Interrupted);
+    handle_signals();  // a new process
   }
   expect_completes("twice");
 }

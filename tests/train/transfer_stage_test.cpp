@@ -106,6 +106,10 @@ TEST(TransferStage, GivesTheSameBitsWithAnyNumberOfThreads) {
   expect_the_same_bits("transfer", tiny_tst(0.1));
 }
 
+TEST(TransferStage, ValidationsLookAtSignals) {
+  expect_validation_to_stop("transfer", tiny_tst(0));
+}
+
 TEST(TransferStage, StateGoesThroughAFile) { expect_to_resume("transfer", tiny_tst(0.1)); }
 
 TEST(TransferStage, ADiscriminatorNeedsVerticesThatCorrespond) {

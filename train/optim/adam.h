@@ -1,4 +1,4 @@
-// Adam exactly as PyTorch's (spec 7).
+// Adam as PyTorch's (spec 7); how near in float32 is said in autograd/kernels/update.h.
 #pragma once
 
 #include "nn/config/config_reader.h"

@@ -58,7 +58,8 @@ Tensor orthogonalised(const Tensor& x) {
 
 bool Muon::takes(const Parameter& p) {
   const Tensor& w = p.value;
-  return w.rank() == 2 && std::min(w.size(0), w.size(1)) >= kLeastSide;
+  return w.rank() >= 2 && w.numel() == w.size(0) * w.size(1) &&
+         std::min(w.size(0), w.size(1)) >= kLeastSide;
 }
 
 Muon::Muon(const std::vector<NamedParameter>& matrices, const MuonConfig& config)
@@ -66,7 +67,8 @@ Muon::Muon(const std::vector<NamedParameter>& matrices, const MuonConfig& config
   for (const NamedParameter& p : matrices) {
     const Tensor& t = p.parameter->value;
     const auto like = std::find_if(groups_.begin(), groups_.end(), [&](const auto& group) {
-      return group[0].m.shape() == t.shape() && group[0].m.dtype() == t.dtype();
+      const Tensor& m = group[0].m;
+      return m.size(0) == t.size(0) && m.size(1) == t.size(1) && m.dtype() == t.dtype();
     });
     auto& group = like != groups_.end() ? *like : groups_.emplace_back();
     group.push_back({p, Tensor::zeros(t.shape(), t.dtype(), t.device())});

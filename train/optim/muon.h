@@ -23,7 +23,8 @@ class Muon {
  public:
   /// Matrices of fewer rows or columns than this are bound by their shape, not by the optimiser.
   static constexpr int64_t kLeastSide = 32;
-  /// Whether a parameter is a matrix that Muon is for.
+  /// Whether a parameter is a matrix that Muon is for, perhaps with axes of one number behind it:
+  /// weights of 1x1 convolutions are [out, in, 1].
   static bool takes(const Parameter& p);
 
   Muon(const std::vector<NamedParameter>& matrices, const MuonConfig& config);

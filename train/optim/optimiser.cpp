@@ -25,13 +25,20 @@ std::vector<NamedParameter> share(const Modules& modules, const OptimiserConfig&
   return out;
 }
 
+int64_t count(const std::vector<NamedParameter>& parameters) {
+  int64_t out = 0;
+  for (const NamedParameter& p : parameters) out += p.parameter->value.numel();
+  return out;
+}
+
 }  // namespace
 
 Optimiser::Optimiser(const Modules& modules, const OptimiserConfig& config)
     : ids_(sorted_ids(modules)),
       muon_(share(modules, config, true), config.muon),
       adam_(share(modules, config, false), config.adam),
-      clip_(config.clip) {}
+      clip_(config.clip),
+      numbers_{count(share(modules, config, true)), count(share(modules, config, false))} {}
 
 void Optimiser::step(const Gradients& gradients, double rate) {
   double scale = 1;

@@ -33,6 +33,11 @@ void visit(V& v, OptimiserConfig& c) {
   v("clip", c.clip, "largest global norm of the gradient; 0: no clipping", at_least(0));
 }
 
+/// How many numbers each of the two moves.
+struct OptimisedNumbers {
+  int64_t muon = 0, adam = 0;
+};
+
 class Optimiser {
  public:
   /// Optimises the parameters of `modules`; the state of each is saved under its prefix.
@@ -44,6 +49,7 @@ class Optimiser {
   void step(const Gradients& gradients, double rate);
   /// Identities of the parameters of this optimiser, ascending.
   const std::vector<uint64_t>& parameters() const { return ids_; }
+  OptimisedNumbers numbers() const { return numbers_; }
   void save(const std::string& prefix, TensorFile& file) const;
   /// InputError if the state does not fit.
   void load(const std::string& prefix, const TensorFile& file, const std::string& where);
@@ -53,6 +59,7 @@ class Optimiser {
   Muon muon_;
   Adam adam_;
   double clip_;
+  OptimisedNumbers numbers_;
 };
 
 }  // namespace restage

@@ -71,16 +71,16 @@ Var length_of_difference(const Var& shape, const Tensor& truth) {
 }  // namespace
 
 CodesStage::CodesStage(const Config& config, const StageInput& in)
-    : Stage("codes", config.optimiser, in.device),
+    : SupervisedStage("codes", config.optimiser, in),
       config_(config),
       train_(in.train),
-      validation_(in.validation),
-      sampler_(in.train, windows_of(config), looked_at(in, config.vertices),
-               sampler_seed(in.seed, "codes.windows")),
-      validation_sampler_(in.validation, windows_of(config), sampler_.vertices(), 1),
-      model_(make_network(config, in)),
-      optimiser_(add_optimiser("optimiser", {"codes"}, config.optimiser)),
-      key_(RngKey{in.seed, 0}.fold("codes.step")) {}
+      validation_(in.validation) {
+  sampler_.emplace(in.train, windows_of(config), looked_at(in, config.vertices),
+                   sampler_seed(in.seed, "codes.windows"));
+  held_out_.emplace(in.validation, windows_of(config), sampler_->vertices(), 1);
+  model_ = make_network(config, in);
+  begin({"codes"}, config.steps_per_batch);
+}
 
 /// The network, with the body and the basis of the training's data. It is as large as the data ask
 /// for: three numbers of pose for each joint, and no more directions than there are.
@@ -98,7 +98,7 @@ H4d* CodesStage::make_network(const Config& config, const StageInput& in) {
                      "give a smaller root, or a larger motion");
   const LinearBody body = fit_linear_body(in.train.bodies, c.shape);
   const MotionBasis basis =
-      fit_motion_basis(sampler_.poses(0, config.basis_windows), c.root, c.motion - c.root);
+      fit_motion_basis(sampler_->poses(0, config.basis_windows), c.root, c.motion - c.root);
   c.shape = body.directions.size(2);
   c.root = basis.root.size(0);
   c.motion = c.root + basis.joints.size(0);
@@ -122,15 +122,17 @@ const CodesStage::Meaning& CodesStage::meaning() {
   Meaning& out = meaning_.emplace();
   out.shapes = shapes_of(train_, body);
   for (Tensor* t : {&body.mean, &body.directions, &body.weights})
-    *t = rows_of(*t, sampler_.vertices()).to(device());
+    *t = rows_of(*t, sampler_->vertices()).to(device());
   out.body = body;
   out.basis = model_->space.basis();
   return out;
 }
 
-CodeWindowBatch CodesStage::batch(int64_t step, const MicroBatch& part) const {
-  const int64_t n = config_.optimiser.batch;
-  return sampler_.batch(part.from(drawn(step) / config_.steps_per_batch * n, n), part.count(n));
+/// Which body a window shows is looked up in the host's memory.
+CodeWindowBatch CodesStage::taken_there(const CodeWindowBatch& here) const {
+  CodeWindowBatch there = moved(here, device());
+  there.body = here.body;
+  return there;
 }
 
 CodesStage::Made CodesStage::make(Context& ctx, const CodeWindowBatch& there, bool rest,
@@ -143,37 +145,22 @@ CodesStage::Made CodesStage::make(Context& ctx, const CodeWindowBatch& there, bo
   return out;
 }
 
-Var CodesStage::loss(Context& ctx, const CodeWindowBatch& there, const Tensor& shapes,
-                     bool corrected, Tensor* made) const {
+Var CodesStage::loss(Context& ctx, const CodeWindowBatch& there, int64_t step,
+                     Tensor* answer) const {
   const CodesLossConfig& l = config_.loss;
-  const Made answer = make(ctx, there, l.rest_shape > 0, corrected);
-  *made = answer.vertices.value;
-  Var total = scale(mean_all(abs(answer.vertices - Var(there.truth))), l.vertices) +
-              scale(length_of_difference(answer.shape, shapes), l.shape);
+  const Tensor shapes = rows_of(meaning_->shapes, there.body).to(device());
+  const Made made = make(ctx, there, l.rest_shape > 0, step >= config_.aux_from);
+  *answer = made.vertices.value;
+  Var total = scale(mean_all(abs(made.vertices - Var(there.truth))), l.vertices) +
+              scale(length_of_difference(made.shape, shapes), l.shape);
   if (l.rest_shape > 0)
-    total = total + scale(length_of_difference(answer.rest, shapes), l.rest_shape);
+    total = total + scale(length_of_difference(made.rest, shapes), l.rest_shape);
   return total;
 }
 
 NamedValues CodesStage::step(int64_t step) {
-  const OptimiserConfig& o = config_.optimiser;
-  const Meaning& m = meaning();
-  const bool corrected = step >= config_.aux_from;
-  const Differentiated d = parts(*optimiser_, [&](const MicroBatch& part) {
-    const CodeWindowBatch windows =
-        ahead_.take(may_draw_ahead(), step, part, [this](auto... of) { return batch(of...); });
-    const CodeWindowBatch there = moved(windows, device());
-    const Tensor shapes = rows_of(m.shapes, windows.body).to(device());
-    Tensor made;
-    Differentiated out =
-        differentiate(part.key(key_.fold(static_cast<uint64_t>(step))),
-                      [&](Context& ctx) { return loss(ctx, there, shapes, corrected, &made); });
-    out.values = {mean_distance(made.cpu(), windows.truth)};
-    return out;
-  });
-  const double rate = learning_rate(o.schedule, step, o.steps);
-  optimiser_->step(d.gradients, rate);
-  return {{"loss", d.loss}, {"distance_mm", 1e3 * d.values[0]}, {"rate", rate}};
+  meaning();
+  return SupervisedStage::step(step);
 }
 
 /// Distances of vertices in the windows, and of the body that the T-pose's shape gives.
@@ -182,35 +169,31 @@ NamedValues CodesStage::validate() {
   Context ctx;
   double distance = 0, shape = 0;
   const int64_t n = config_.validation_windows;
-  for (int64_t i = 0; i < n; ++i) {
-    const CodeWindowBatch windows = validation_sampler_.batch(i, 1);
+  in_validation(n, 1, [&](int64_t i, int64_t) {
+    const CodeWindowBatch windows = held_out_->batch(i, 1);
     const Made made = make(ctx, moved(windows, device()), true, true);
     distance += mean_distance(made.vertices.value.cpu(), windows.truth) / static_cast<double>(n);
     const Points& vertices =
         validation_.bodies[static_cast<size_t>(windows.body.data<int32_t>()[0])].rest.vertices;
-    Tensor truth = Tensor::empty({1, std::ssize(sampler_.vertices()), 3});
-    for (float* to = truth.data<float>(); const int32_t v : sampler_.vertices())
+    Tensor truth = Tensor::empty({1, std::ssize(sampler_->vertices()), 3});
+    for (float* to = truth.data<float>(); const int32_t v : sampler_->vertices())
       to = std::copy_n(vertices[static_cast<size_t>(v)].data(), 3, to);
     const Tensor rest = shaped(m.body.mean, m.body.directions, made.rest).value.cpu();
     shape += mean_distance(rest, truth) / static_cast<double>(n);
-  }
+  });
   return {{"distance_mm", 1e3 * distance}, {"shape_mm", 1e3 * shape}};
 }
 
 std::vector<Shown> CodesStage::show() {
   meaning();
-  const int64_t n = std::min<int64_t>(8, config_.validation_windows);
-  const CodeWindowBatch windows = validation_sampler_.batch(0, n);
+  const int64_t n = shown_of(config_.validation_windows);
+  const CodeWindowBatch windows = held_out_->batch(0, n);
   Context ctx;
   const Tensor made = make(ctx, moved(windows, device()), false, true).vertices.value.cpu();
-  Shown source{"cloud", {}}, answered{"body of its codes", {}}, truth{"true body", {}};
-  const int64_t t = made.size(1), last = t - 1;
-  for (int64_t i = 0; i < n; ++i) {
-    source.clouds.push_back(points_of(windows.clouds, i * t + last, windows.clouds.size(2)));
-    answered.clouds.push_back(points_of(made, i * t + last, made.size(2)));
-    truth.clouds.push_back(points_of(windows.truth, i * t + last, made.size(2)));
-  }
-  return {source, answered, truth};
+  const int64_t t = made.size(1);
+  const std::vector<int64_t> last = spaced(n, t - 1, t);  // frames
+  return {clouds_of("cloud", windows.clouds, last), clouds_of("body of its codes", made, last),
+          clouds_of("true body", windows.truth, last)};
 }
 
 }  // namespace restage

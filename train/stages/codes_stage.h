@@ -4,9 +4,7 @@
 
 #include "datasets/sampling/code_windows.h"
 #include "nn/models/h4d.h"
-#include "train/ahead.h"
-#include "train/stage.h"
-#include "train/stages/stage_input.h"
+#include "train/stages/supervised_stage.h"
 
 namespace restage {
 
@@ -56,14 +54,14 @@ void visit(V& v, CodesStageConfig& c) {
   v("validation_windows", c.validation_windows, "held-out windows per validation", between(1, 1e6));
 }
 
-class CodesStage final : public Stage {
+class CodesStage final : public SupervisedStage<CodeWindowSampler> {
  public:
   using Config = CodesStageConfig;
   static std::vector<std::string> reads(const Config&) { return {}; }
   CodesStage(const Config& config, const StageInput& input);
   NamedValues step(int64_t step) override;
-  NamedTensors examples(int64_t step) const override { return named_tensors(batch(step)); }
   NamedValues validate() override;
+  std::vector<std::string> figures() override { return {"distance_mm", "shape_mm"}; }
   std::vector<Shown> show() override;
 
  private:
@@ -79,23 +77,19 @@ class CodesStage final : public Stage {
   };
   H4d* make_network(const Config& config, const StageInput& input);
   const Meaning& meaning();
-  CodeWindowBatch batch(int64_t step, const MicroBatch& part = {}) const;
   /// `corrected`: by the auxiliary code, if the network has one.
   Made make(Context& ctx, const CodeWindowBatch& there, bool rest, bool corrected) const;
-  Var loss(Context& ctx, const CodeWindowBatch& there, const Tensor& shapes, bool corrected,
-           Tensor* made) const;
+  CodeWindowBatch taken_there(const CodeWindowBatch& here) const override;
+  Var loss(Context& ctx, const CodeWindowBatch& there, int64_t step, Tensor* answer) const override;
+  Tensor truth(const CodeWindowBatch& here) const override { return here.truth; }
   void load_more(const TensorFile&, const std::string&) override { meaning_.reset(); }
 
   Config config_;
   const Corpus &train_, &validation_;
-  CodeWindowSampler sampler_, validation_sampler_;
   H4d* model_;
-  Optimiser* optimiser_;
-  RngKey key_;
   // Weights may be loaded after the constructor, and they bring their own; so this is made of the
   // network's buffers when a step or a validation first needs it.
   std::optional<Meaning> meaning_;
-  Ahead<CodeWindowBatch> ahead_;
 };
 
 }  // namespace restage

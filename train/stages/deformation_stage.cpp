@@ -37,7 +37,7 @@ void add_shared_skin(const Tensor& predicted, const Tensor& truth,
 }  // namespace
 
 DeformationStage::DeformationStage(const Config& config, const StageInput& in)
-    : Stage("deformation", config.optimiser, in.device),
+    : SupervisedStage("deformation", config.optimiser, in),
       config_(config),
       weights_(add_network<DeformationModel>(config.model,
                                              RngKey{in.seed, 0}.fold("deformation/weights"))),
@@ -46,13 +46,12 @@ DeformationStage::DeformationStage(const Config& config, const StageInput& in)
                          "deformation.offsets", "deformation/offsets", config.model.sizes,
                          RngKey{in.seed, 0}.fold("deformation/offsets"),
                          {{"keep_root_rotation", config.keep_root_rotation ? "true" : "false"}})
-                   : nullptr),
-      optimiser_(add_optimiser("optimiser", {"deformation.weights", "deformation.offsets"},
-                               config.optimiser)),
-      sampler_(in.train, with_weights(config.pairs, config.supervision > 0),
-               sampler_seed(in.seed, "deformation.pairs")),
-      validation_sampler_(in.validation, held_out(config.pairs), 1),
-      key_(RngKey{in.seed, 0}.fold("deformation.step")) {}
+                   : nullptr) {
+  sampler_.emplace(in.train, with_weights(config.pairs, config.supervision > 0),
+                   sampler_seed(in.seed, "deformation.pairs"));
+  held_out_.emplace(in.validation, held_out(config.pairs), 1);
+  begin({"deformation.weights", "deformation.offsets"});
+}
 
 DeformationBatch DeformationStage::batch_of(const PairBatch& p) const {
   DeformationBatch b{p.rest_points, p.posed_points, p.rest_joints, p.local,
@@ -62,11 +61,6 @@ DeformationBatch DeformationStage::batch_of(const PairBatch& p) const {
     b.axis_angle = concat({Var(none), slice(Var(p.axis_angle), 1, 3, 3 * kJoints)}, 1).value;
   }
   return b;
-}
-
-PairBatch DeformationStage::batch(int64_t step, const MicroBatch& part) const {
-  const int64_t n = config_.optimiser.batch;
-  return sampler_.batch(part.from(drawn(step) * n, n), part.count(n));
 }
 
 /// The loss: a sum over the points of a pair, a mean over pairs.
@@ -82,32 +76,13 @@ Var DeformationStage::loss(Context& ctx, const PairBatch& pairs, int64_t step,
   return scale(total, 1.0 / static_cast<double>(b.posed_points.size(0)));
 }
 
-NamedValues DeformationStage::step(int64_t step) {
-  const OptimiserConfig& o = config_.optimiser;
-  const Differentiated d = parts(*optimiser_, [&](const MicroBatch& part) {
-    const PairBatch pairs =
-        ahead_.take(may_draw_ahead(), step, part, [this](auto... of) { return batch(of...); });
-    const PairBatch there = moved(pairs, device());
-    Tensor posed;
-    Differentiated out =
-        differentiate(part.key(key_.fold(static_cast<uint64_t>(step))),
-                      [&](Context& ctx) { return loss(ctx, there, step, &posed); });
-    out.values = {mean_distance(posed.cpu(), pairs.posed_points)};
-    return out;
-  });
-  const double rate = learning_rate(o.schedule, step, o.steps);
-  optimiser_->step(d.gradients, rate);
-  return {{"loss", d.loss}, {"distance_mm", 1e3 * d.values[0]}, {"rate", rate}};
-}
-
 NamedValues DeformationStage::validate() {
   Context ctx;
   double with = 0, without = 0;
   std::array<double, kJoints> skin{}, kept{};
-  const int64_t n = config_.validation_pairs, part = 4;
-  for (int64_t i = 0; i < n; i += part) {
-    const int64_t count = std::min(part, n - i);
-    const PairBatch pairs = validation_sampler_.batch(i, count);
+  const int64_t n = config_.validation_pairs;
+  in_validation(n, 4, [&](int64_t i, int64_t count) {
+    const PairBatch pairs = held_out_->batch(i, count);
     const DeformationBatch b = batch_of(moved(pairs, device()));
     const auto error = [&](const DeformationOutput& out) {
       return static_cast<double>(count) / static_cast<double>(n) *
@@ -117,7 +92,7 @@ NamedValues DeformationStage::validate() {
     const DeformationOutput plain = deform(ctx, *weights_, nullptr, b);
     without += error(plain);
     add_shared_skin(plain.weights.value.cpu(), pairs.weights, &skin, &kept);
-  }
+  });
   double lost = 0;  // of the joint that loses most
   for (int j = 0; j < kJoints; ++j)
     if (skin[j] > 0) lost = std::max(lost, 1 - kept[j] / skin[j]);
@@ -127,18 +102,19 @@ NamedValues DeformationStage::validate() {
   return values;
 }
 
+std::vector<std::string> DeformationStage::figures() {
+  if (offsets_ == nullptr) return {"skinning_mm", "skin_lost"};
+  return {"with_offsets_mm", "skinning_mm", "skin_lost"};
+}
+
 std::vector<Shown> DeformationStage::show() {
-  const int64_t n = std::min<int64_t>(8, config_.validation_pairs);
-  const PairBatch pairs = validation_sampler_.batch(0, n);
+  const int64_t n = shown_of(config_.validation_pairs);
+  const PairBatch pairs = held_out_->batch(0, n);
   Context ctx;
   const Tensor posed =
       deform(ctx, *weights_, offsets_, batch_of(moved(pairs, device()))).posed.value.cpu();
-  Shown answered{"posed points", {}}, truth{"true points", {}};
-  for (int64_t i = 0; i < n; ++i) {
-    answered.clouds.push_back(points_of(posed, i, posed.size(1)));
-    truth.clouds.push_back(points_of(pairs.posed_points, i, posed.size(1)));
-  }
-  return {answered, truth};
+  return {clouds_of("posed points", posed, spaced(n)),
+          clouds_of("true points", pairs.posed_points, spaced(n))};
 }
 
 }  // namespace restage

@@ -4,9 +4,7 @@
 #include "datasets/sampling/pairs.h"
 #include "nn/losses/deformation.h"
 #include "nn/models/deformation.h"
-#include "train/ahead.h"
-#include "train/stage.h"
-#include "train/stages/stage_input.h"
+#include "train/stages/supervised_stage.h"
 
 namespace restage {
 
@@ -49,28 +47,23 @@ void visit(V& v, DeformationStageConfig& c) {
   v("validation_pairs", c.validation_pairs, "held-out pairs per validation", between(1, 1e6));
 }
 
-class DeformationStage final : public Stage {
+class DeformationStage final : public SupervisedStage<PairSampler> {
  public:
   using Config = DeformationStageConfig;
   static std::vector<std::string> reads(const Config&) { return {}; }
   DeformationStage(const Config& config, const StageInput& input);
-  NamedValues step(int64_t step) override;
-  NamedTensors examples(int64_t step) const override { return named_tensors(batch(step)); }
   NamedValues validate() override;
+  std::vector<std::string> figures() override;
   std::vector<Shown> show() override;
 
  private:
-  PairBatch batch(int64_t step, const MicroBatch& part = {}) const;
   DeformationBatch batch_of(const PairBatch& pairs) const;
-  Var loss(Context& ctx, const PairBatch& pairs, int64_t step, Tensor* posed) const;
+  Var loss(Context& ctx, const PairBatch& pairs, int64_t step, Tensor* posed) const override;
+  Tensor truth(const PairBatch& here) const override { return here.posed_points; }
 
   Config config_;
   DeformationModel* weights_;
   OffsetNet* offsets_;  // null: none
-  Optimiser* optimiser_;
-  PairSampler sampler_, validation_sampler_;
-  RngKey key_;
-  Ahead<PairBatch> ahead_;
 };
 
 }  // namespace restage

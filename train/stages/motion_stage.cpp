@@ -351,8 +351,9 @@ NamedValues MotionStage::validate() {
   Judged network, closed_form;
   double cycle = 0;
   const int64_t n = config_.validation_windows;
-  for (int64_t i = 0; i < n; i += 16) {
-    const WindowBatch b = windows().validation.batch(i, std::min<int64_t>(16, n - i));
+  const Windows& made = windows();  // by all processes of a team together
+  in_validation(n, 16, [&](int64_t i, int64_t some) {
+    const WindowBatch b = made.validation.batch(i, some);
     const WindowBatch there = moved(b, device());
     MotionState forth, back, none;
     const MotionOutput to_b = model_->forward(ctx, motion_batch(there).seen(there.rest_b), &forth);
@@ -364,7 +365,7 @@ NamedValues MotionStage::validate() {
                     0);
     cycle += window_error(metrics::mean_distance, frames_of(to_a, 2 * late, t).joints.value,
                           first_frames(b.joints_a, t - 2 * late), metrics::Alignment::Mode::none);
-  }
+  });
   const auto count = static_cast<double>(n);
   return {{"pa_mpjpe", network.pa / count},
           {"local_mpjpe", network.local / count},
@@ -376,6 +377,17 @@ NamedValues MotionStage::validate() {
           {"closed_form_rotation", closed_form.rotation / count}};
 }
 
+std::vector<std::string> MotionStage::figures() {
+  return {"pa_mpjpe",
+          "local_mpjpe",
+          "cycle_mpjpe",
+          "acceleration",
+          "rotation",
+          "closed_form_pa_mpjpe",
+          "closed_form_acceleration",
+          "closed_form_rotation"};
+}
+
 std::vector<Shown> MotionStage::show() {
   constexpr int64_t kMoments = 8;
   const WindowBatch b = windows().validation.batch(0, 1);
@@ -385,14 +397,14 @@ std::vector<Shown> MotionStage::show() {
   const Tensor answer =
       model_->forward(ctx, motion_batch(there).seen(there.rest_b), &state).joints.value.cpu();
   const int64_t late = model_->latency(), t = b.joints_a.size(1) - late;
-  Shown source{"source", {}}, answered{"answer", {}}, truth{"truth", {}};
-  for (int64_t k = 0; k < std::min(kMoments, t); ++k) {
-    const int64_t frame = k * (t - 1) / std::max<int64_t>(1, std::min(kMoments, t) - 1);
-    source.skeletons.push_back(joints_of(b.joints_a, frame));
-    answered.skeletons.push_back(joints_of(answer, frame + late));
-    truth.skeletons.push_back(joints_of(b.truth_b, frame));
-  }
-  return {source, answered, truth};
+  std::vector<int64_t> moments;
+  const int64_t count = std::min(kMoments, t);
+  for (int64_t k = 0; k < count; ++k)
+    moments.push_back(k * (t - 1) / std::max<int64_t>(1, count - 1));
+  std::vector<int64_t> answered = moments;
+  for (int64_t& frame : answered) frame += late;
+  return {skeletons_of("source", b.joints_a, moments), skeletons_of("answer", answer, answered),
+          skeletons_of("truth", b.truth_b, moments)};
 }
 
 void MotionStage::save_more(TensorFile& file) const {

@@ -104,6 +104,7 @@ class MotionStage final : public Stage {
   /// Errors against the true motion of B, as the evaluation measures them, and the two losses whose
   /// drifting apart shows B becoming a hidden code for A.
   NamedValues validate() override;
+  std::vector<std::string> figures() override;
   std::vector<Shown> show() override;
 
  private:

@@ -1,5 +1,6 @@
 #include "train/stages/registry.h"
 
+#include "autograd/base/registry.h"
 #include "train/stages/codes_stage.h"
 #include "train/stages/deformation_stage.h"
 #include "train/stages/motion_stage.h"
@@ -9,8 +10,8 @@
 namespace restage {
 namespace {
 
-std::vector<StageType>& table() {
-  static std::vector<StageType> all = {
+std::deque<StageType> ours() {
+  return {
       stage_of<SkeletonStage>("skeleton", "the skeleton extractor", {"skeleton"},
                               {"joint_error_mm", "tpose_joint_error_mm", "ring_joint_error_mm",
                                "one_camera_joint_error_mm", "intruder_joint_error_mm",
@@ -27,24 +28,20 @@ std::vector<StageType>& table() {
       stage_of<CodesStage>("codes", "codes of shape, pose and motion of a window of clouds",
                            {"codes"}, {"distance_mm", "shape_mm"}),
   };
+}
+
+Registry<StageType>& table() {
+  static Registry<StageType> all("stage", ours());
   return all;
 }
 
 }  // namespace
 
-const std::vector<StageType>& stage_types() { return table(); }
+const std::deque<StageType>& stage_types() { return table().all(); }
 
-void register_stage(StageType type) {
-  for (const StageType& known : table())
-    if (known.name == type.name) throw Error("there is a stage '" + type.name + "' already");
-  table().push_back(std::move(type));
-}
+void register_stage(StageType type) { table().add(std::move(type)); }
 
-std::vector<std::string> stage_names() {
-  std::vector<std::string> out;
-  for (const StageType& type : stage_types()) out.push_back(type.name);
-  return out;
-}
+std::vector<std::string> stage_names() { return table().names(); }
 
 std::string unknown_figure(const std::vector<std::string>& names) {
   for (const std::string& name : names) {
@@ -56,11 +53,7 @@ std::string unknown_figure(const std::vector<std::string>& names) {
   return "";
 }
 
-const StageType& stage_type(const std::string& name) {
-  for (const StageType& type : stage_types())
-    if (type.name == name) return type;
-  throw InputError("", "there is no stage '" + name + "'", "use one of those in the configuration");
-}
+const StageType& stage_type(const std::string& name) { return table().get(name); }
 
 Bundle networks_of(const StageType& stage, const std::string& path) {
   const Bundle out = load_bundle(path).only(with_late(stage.roles));

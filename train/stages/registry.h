@@ -2,6 +2,7 @@
 // class derived from Stage) and one line in registry.cpp.
 #pragma once
 
+#include <deque>
 #include <memory>
 #include <string>
 #include <vector>
@@ -46,14 +47,14 @@ StageType stage_of(const char* name, const char* help, std::vector<std::string> 
           shorten};
 }
 
-const std::vector<StageType>& stage_types();
+const std::deque<StageType>& stage_types();
 /// Adds a stage of a program that uses this library, before anything else is done: its section is
 /// then a section of every configuration. Error if there is one of that name.
 void register_stage(StageType type);
 std::vector<std::string> stage_names();
 /// The first of `names` that is not STAGE.FIGURE of some stage; "" if there is none.
 std::string unknown_figure(const std::vector<std::string>& names);
-/// InputError if there is no such stage.
+/// The stage of this name. InputError with the nearest known name if there is none.
 const StageType& stage_type(const std::string& name);
 /// The networks that a stage would leave, taken from a weights file, run or artifact. InputError if
 /// `path` has no such networks.

@@ -76,17 +76,16 @@ CloudConfig held_out(CloudConfig c, const SkeletonModel& model) {
 }  // namespace
 
 SkeletonStage::SkeletonStage(const Config& config, const StageInput& in)
-    : Stage("skeleton", config.optimiser, in.device),
+    : SupervisedStage("skeleton", config.optimiser, in),
       config_(config),
       model_(add_network<SkeletonModel>(config.model, RngKey{in.seed, 0}.fold("skeleton.init"),
                                         with_joints({}, in))),
-      optimiser_(add_optimiser("optimiser", {"skeleton"}, config.optimiser)),
-      sampler_(in.train, training_clouds(config, *model_),
-               sampler_seed(in.seed, "skeleton.clouds")),
-      validation_sampler_(in.validation, held_out(config.clouds, *model_), 1),
       posed_(evaluation_clouds(in.validation, static_cast<size_t>(config.validation_clouds), 1)),
-      tposes_(evaluation_tposes(in.validation, 4, config.clouds.tpose_heading, 1)),
-      key_(RngKey{in.seed, 0}.fold("skeleton.step")) {
+      tposes_(evaluation_tposes(in.validation, 4, config.clouds.tpose_heading, 1)) {
+  sampler_.emplace(in.train, training_clouds(config, *model_),
+                   sampler_seed(in.seed, "skeleton.clouds"));
+  held_out_.emplace(in.validation, held_out(config.clouds, *model_), 1);
+  begin({"skeleton"});
   const auto scans = [&](EvaluationScans how) {
     how.points = static_cast<int>(model_->points());
     return evaluation_scans(in.validation, posed_, how, 1);
@@ -110,7 +109,7 @@ Var bone_lengths(const Var& joints) {
 
 }  // namespace
 
-Var SkeletonStage::loss(const SkeletonAnswer& answer, const CloudBatch& batch) const {
+Var SkeletonStage::loss_of(const SkeletonAnswer& answer, const CloudBatch& batch) const {
   Var total = config_.loss == Measure::mse ? mse(answer.joints, Var(batch.joints))
                                            : mean_all(lengths(answer.joints - Var(batch.joints)));
   if (config_.bone_weight > 0)
@@ -129,10 +128,10 @@ Var SkeletonStage::loss(const SkeletonAnswer& answer, const CloudBatch& batch) c
   return total;
 }
 
-Var SkeletonStage::loss(Context& ctx, const CloudBatch& batch) const {
+Var SkeletonStage::loss(Context& ctx, const CloudBatch& batch, int64_t, Tensor*) const {
   const SkeletonOutput out = model_->forward(ctx, {batch.points, batch.past});
-  Var total = loss(out, batch);
-  for (const SkeletonAnswer& before : out.before) total = total + loss(before, batch);
+  Var total = loss_of(out, batch);
+  for (const SkeletonAnswer& before : out.before) total = total + loss_of(before, batch);
   if (!out.centres.defined() || !batch.weights.defined()) return total;
   return total + voting_loss(out, batch);
 }
@@ -154,17 +153,11 @@ Var SkeletonStage::voting_loss(const SkeletonOutput& out, const CloudBatch& batc
   return total;
 }
 
-CloudBatch SkeletonStage::batch(int64_t step, const MicroBatch& part) const {
-  const int64_t n = config_.optimiser.batch;
-  return sampler_.batch(part.from(drawn(step) * n, n), part.count(n));
-}
-
 /// Where a cloud asks for a memory, it gets what this model says of the frame before. So errors of
 /// this frame and of the frame before are alike, which memories drawn at random would not teach.
-void SkeletonStage::recall(int64_t step, const MicroBatch& part, CloudBatch* clouds) const {
+void SkeletonStage::complete(int64_t step, const MicroBatch& part, CloudBatch* clouds) const {
   if (clouds->asked.empty()) return;
-  const int64_t n = config_.optimiser.batch;
-  const CloudBatch before = sampler_.before(part.from(drawn(step) * n, n), *clouds);
+  const CloudBatch before = sampler_->before(first_of(step, part), *clouds);
   Context ctx;
   const SkeletonAnswer answer =
       on_host(model_->forward(ctx, {before.points.to(device()), before.past.to(device())}));
@@ -179,32 +172,17 @@ void SkeletonStage::recall(int64_t step, const MicroBatch& part, CloudBatch* clo
                 clouds->past.data<float>() + clouds->asked[k] * row);
 }
 
-NamedValues SkeletonStage::step(int64_t step) {
-  const OptimiserConfig& o = config_.optimiser;
-  const Differentiated d = parts(*optimiser_, [&](const MicroBatch& part) {
-    CloudBatch clouds =
-        ahead_.take(may_draw_ahead(), step, part, [this](auto... of) { return batch(of...); });
-    recall(step, part, &clouds);
-    clouds = moved(std::move(clouds), device());
-    return differentiate(part.key(key_.fold(static_cast<uint64_t>(step))),
-                         [&](Context& ctx) { return loss(ctx, clouds); });
-  });
-  const double rate = learning_rate(o.schedule, step, o.steps);
-  optimiser_->step(d.gradients, rate);
-  return {{"loss", d.loss}, {"gradient_norm", d.norm}, {"rate", rate}};
-}
-
 SkeletonErrors skeleton_errors(SkeletonModel& model, const CloudBatch& clouds) {
   Context ctx;
   const Device device = device_of(model);
   double joints = 0, turns = 0, outside = 0;
   bool gives_turns = false, gives_uncertainty = false;
-  const int64_t n = clouds.points.size(0), part = 16;
-  for (int64_t i = 0; i < n; i += part) {
-    const int64_t to = std::min(n, i + part);
+  const int64_t n = clouds.points.size(0);
+  in_validation(n, 16, [&](int64_t i, int64_t some) {
+    const int64_t to = i + some;
     const SkeletonAnswer out = on_host(model.forward(ctx, clouds.points.rows(i, to).to(device)));
     const Tensor truth = clouds.joints.rows(i, to);
-    joints += mean_distance(out.joints.value, truth) * static_cast<double>(to - i);
+    joints += mean_distance(out.joints.value, truth) * static_cast<double>(some);
     gives_turns = out.turns.value.defined() && clouds.turns.defined();
     gives_uncertainty = out.uncertainty.value.defined();
     if (gives_turns) turns += total_angle(out.turns.value, clouds.turns.rows(i, to));
@@ -212,7 +190,7 @@ SkeletonErrors skeleton_errors(SkeletonModel& model, const CloudBatch& clouds) {
     for (int64_t k = 0; gives_uncertainty && k < error.numel(); ++k)
       outside +=
           error.data<float>()[k] > kNinety * std::exp(out.uncertainty.value.data<float>()[k]);
-  }
+  });
   const auto count = static_cast<double>(n * kJoints);
   SkeletonErrors mean{joints / static_cast<double>(n), {}, {}};
   if (gives_turns) mean.turns = turns / count;
@@ -243,7 +221,7 @@ double followed_error(SkeletonModel& model, const CloudBatch& clouds, int64_t fr
   SkeletonAnswer answer;
   double sum = 0;
   std::vector<int64_t> rows;
-  for (int64_t f = 0; f < frames; ++f) {
+  in_validation(frames, 1, [&](int64_t f, int64_t) {
     const std::vector<int64_t> before = std::exchange(rows, {});
     for (int64_t s = 0; s < sequences; ++s) rows.push_back(s * frames + f);
     const Tensor past =
@@ -253,7 +231,7 @@ double followed_error(SkeletonModel& model, const CloudBatch& clouds, int64_t fr
     answer =
         on_host(model.forward(ctx, {rows_of(clouds.points, rows).to(device), past.to(device)}));
     sum += mean_distance(answer.joints.value, rows_of(clouds.joints, rows));
-  }
+  });
   return sum / static_cast<double>(frames);
 }
 
@@ -268,8 +246,8 @@ NamedValues SkeletonStage::validate() {
     if (errors.turns) worst(turns, *errors.turns * 180 / M_PI);
     if (errors.outside) worst(miscalibration, std::abs(*errors.outside - 0.1));
   };
-  put("joint_error_mm", validation_sampler_.clouds(posed_));
-  put("tpose_joint_error_mm", validation_sampler_.clouds(tposes_));
+  put("joint_error_mm", held_out_->clouds(posed_));
+  put("tpose_joint_error_mm", held_out_->clouds(tposes_));
   put("ring_joint_error_mm", ring_);
   put("one_camera_joint_error_mm", one_camera_);
   put("intruder_joint_error_mm", intruded_);
@@ -282,19 +260,30 @@ NamedValues SkeletonStage::validate() {
   return out;
 }
 
+std::vector<std::string> SkeletonStage::figures() {
+  std::vector<std::string> out{"joint_error_mm", "tpose_joint_error_mm"};
+  const auto add = [&](const char* name, const Tensor& measured) {
+    if (measured.defined()) out.emplace_back(name);
+  };
+  add("ring_joint_error_mm", ring_.points);
+  add("one_camera_joint_error_mm", one_camera_.points);
+  add("intruder_joint_error_mm", intruded_.points);
+  add("followed_joint_error_mm", followed_.points);
+  Context ctx;  // what the model says beside joints, an answer shows
+  const SkeletonOutput one =
+      model_->forward(ctx, held_out_->clouds({posed_.front()}).points.to(device()));
+  add("turn_error_degrees", one.turns.value);
+  add("miscalibration", one.uncertainty.value);
+  return out;
+}
+
 std::vector<Shown> SkeletonStage::show() {
-  const size_t n = std::min<size_t>(8, posed_.size());
-  const CloudBatch clouds =
-      validation_sampler_.clouds({posed_.begin(), posed_.begin() + static_cast<std::ptrdiff_t>(n)});
+  const int64_t n = shown_of(std::ssize(posed_));
+  const CloudBatch clouds = held_out_->clouds({posed_.begin(), posed_.begin() + n});
   Context ctx;
   const Tensor answer = model_->forward(ctx, clouds.points.to(device())).joints.value.cpu();
-  Shown seen{"cloud", {}}, answered{"joints", {}}, truth{"true joints", {}};
-  for (int64_t i = 0; i < static_cast<int64_t>(n); ++i) {
-    seen.clouds.push_back(points_of(clouds.points, i, clouds.points.size(1)));
-    answered.skeletons.push_back(joints_of(answer, i));
-    truth.skeletons.push_back(joints_of(clouds.joints, i));
-  }
-  return {seen, answered, truth};
+  return {clouds_of("cloud", clouds.points, spaced(n)), skeletons_of("joints", answer, spaced(n)),
+          skeletons_of("true joints", clouds.joints, spaced(n))};
 }
 
 }  // namespace restage

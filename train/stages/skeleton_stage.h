@@ -3,9 +3,7 @@
 
 #include "datasets/sampling/evaluation.h"
 #include "nn/models/skeleton.h"
-#include "train/ahead.h"
-#include "train/stage.h"
-#include "train/stages/stage_input.h"
+#include "train/stages/supervised_stage.h"
 
 namespace restage {
 
@@ -64,34 +62,28 @@ void visit(V& v, SkeletonStageConfig& c) {
   v("validation_clouds", c.validation_clouds, "held-out clouds per validation", between(1, 1e6));
 }
 
-class SkeletonStage final : public Stage {
+class SkeletonStage final : public SupervisedStage<CloudSampler> {
  public:
   using Config = SkeletonStageConfig;
   static std::vector<std::string> reads(const Config&) { return {}; }
   SkeletonStage(const Config& config, const StageInput& input);
-  NamedValues step(int64_t step) override;
-  NamedTensors examples(int64_t step) const override { return named_tensors(batch(step)); }
   NamedValues validate() override;
+  std::vector<std::string> figures() override;
   std::vector<Shown> show() override;
 
  private:
-  CloudBatch batch(int64_t step, const MicroBatch& part = {}) const;
-  void recall(int64_t step, const MicroBatch& part, CloudBatch* clouds) const;
-  Var loss(Context& ctx, const CloudBatch& batch) const;
-  Var loss(const SkeletonAnswer& answer, const CloudBatch& batch) const;
+  void complete(int64_t step, const MicroBatch& part, CloudBatch* clouds) const override;
+  Var loss(Context& ctx, const CloudBatch& batch, int64_t step, Tensor* answer) const override;
+  Var loss_of(const SkeletonAnswer& answer, const CloudBatch& batch) const;
   Var voting_loss(const SkeletonOutput& out, const CloudBatch& batch) const;
 
   Config config_;
   SkeletonModel* model_;
-  Optimiser* optimiser_;
-  CloudSampler sampler_, validation_sampler_;
   std::vector<CloudSubject> posed_, tposes_;
   // Held-out scans by ray casting, one batch for each kind of cloud; undefined if the stage does
   // not train on that kind.
   CloudBatch one_camera_, ring_, intruded_;
   CloudBatch followed_;  ///< held-out sequences of people whom one camera follows
-  RngKey key_;
-  Ahead<CloudBatch> ahead_;
 };
 
 /// Errors of a model on given clouds (evaluation mode); means over joints.

@@ -2,11 +2,8 @@
 #pragma once
 
 #include "datasets/sampling/transfers.h"
-#include "nn/models/transfer.h"
-#include "nn/models/tst.h"
-#include "train/ahead.h"
-#include "train/stage.h"
-#include "train/stages/stage_input.h"
+#include "nn/losses/transfer.h"
+#include "train/stages/supervised_stage.h"
 
 namespace restage {
 
@@ -27,16 +24,13 @@ void visit(V& v, TransferConfig& c) {
     between(1, 100000));
 }
 
-enum class EdgeReference { identity, truth };
 inline EnumNames<EdgeReference> config_names(EdgeReference) {
   return {{"identity", EdgeReference::identity}, {"truth", EdgeReference::truth}};
 }
 
-struct TransferLossConfig {
-  double reconstruction = 1, edge = 0.0005, distances = 0, metric = 0, adversarial = 0;
+struct TransferLossConfig : TransferWeights {
   bool train_discriminator = true;
-  EdgeReference edge_reference = EdgeReference::identity;
-  int64_t metric_from = 0, metric_points = 1024;
+  int64_t metric_from = 0;
 };
 
 template <class V>
@@ -76,31 +70,29 @@ void visit(V& v, TransferStageConfig& c) {
   v("validation_pairs", c.validation_pairs, "held-out pairs per validation", between(1, 1e6));
 }
 
-class TransferStage final : public Stage {
+class TransferStage final : public SupervisedStage<TransferSampler> {
  public:
   using Config = TransferStageConfig;
   static std::vector<std::string> reads(const Config&) { return {}; }
   TransferStage(const Config& config, const StageInput& input);
   NamedValues step(int64_t step) override;
-  NamedTensors examples(int64_t step) const override { return named_tensors(batch(step)); }
   NamedValues validate() override;
+  std::vector<std::string> figures() override { return {"distance_mm", "pmd_1e4"}; }
   std::vector<Shown> show() override;
 
  private:
-  TransferBatch batch(int64_t step, const MicroBatch& part = {}) const;
-  Var loss(Context& ctx, const TransferBatch& pairs, int64_t step, Tensor* posed);
-  Var metric(Context& ctx, const TransferBatch& pairs);
-  /// The discriminator learns to tell true frames from the network's.
-  double update_discriminator(int64_t step, double rate);
+  TransferBatch taken_there(const TransferBatch& here) const override;
+  Var loss(Context& ctx, const TransferBatch& pairs, int64_t step, Tensor* posed) const override;
+  Tensor truth(const TransferBatch& here) const override { return here.truth; }
+  void check_losses() const;
+  void add_discriminator(const StageInput& input);
+  /// The discriminator learns to tell true frames from the network's; its loss.
+  double update_discriminator(int64_t step);
 
   Config config_;
   TransferModel* model_;
-  Optimiser* optimiser_;
   TstDiscriminator* discriminator_ = nullptr;     ///< null without an adversarial loss
   Optimiser* discriminator_optimiser_ = nullptr;  ///< null if the discriminator is not trained
-  TransferSampler sampler_, validation_sampler_;
-  RngKey key_;
-  Ahead<TransferBatch> ahead_;
 };
 
 }  // namespace restage

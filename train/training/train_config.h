@@ -38,7 +38,7 @@ struct EvaluationConfig {
   std::string system = "chain";  ///< infer/systems.h
   double anchor = 0.25;          ///< of RetargetOptions
   /// Of RetargetOptions, where true is usual.
-  bool steady_bones = false, keep_limbs = false, any_size = false;
+  bool steady_bones = false, keep_limbs = false, any_size = false, any_way_up = false;
   ScanConfig scans;
 };
 
@@ -64,6 +64,8 @@ void visit(V& v, EvaluationConfig& c) {
     added("false"));
   v("any_size", c.any_size, "people of any size are seen in an adult's, as 'restage retarget' does",
     added("false"));
+  v("any_way_up", c.any_way_up,
+    "who lies or stands on the hands is shown upright, as 'restage retarget' does", added("false"));
   v("scans", c.scans, "held-out sequences as they are seen");
   v("every", c.every, "a sweep's trial is measured on every so many frames", positive());
 }

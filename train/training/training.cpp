@@ -19,6 +19,22 @@ void check_order(const TrainConfig& config, const StageType& type, const AnyConf
           "name " + read + " before it in stages (" + read + ".from takes it from elsewhere)");
 }
 
+/// Error if the loop monitors a figure that the stage does not measure with this configuration.
+void check_monitored(const SelectionConfig& selection, Stage& stage) {
+  const std::string monitor = monitored(selection, stage.name());
+  if (monitor.empty()) return;
+  std::string known;
+  for (const std::string& figure : stage.figures()) {
+    if (figure == monitor) return;
+    known += (known.empty() ? "" : ", ") + stage.name() + "." + figure;
+  }
+  if (!known.empty())
+    throw InputError(
+        "loop.monitor",
+        "names '" + stage.name() + "." + monitor + "', which this configuration does not measure",
+        "name one of " + known);
+}
+
 }  // namespace
 
 std::unique_ptr<Stage> make_stage(const TrainConfig& config, const std::string& name,
@@ -36,6 +52,7 @@ std::unique_ptr<Stage> make_stage(const TrainConfig& config, const std::string& 
                                           data.answers, device_of(config.device)});
   stage->repeat_batches(config.loop.overfit_batches);
   stage->cut_steps(config.loop.micro_batches, data.team != nullptr ? *data.team : alone());
+  check_monitored(config.loop.selection, *stage);
   if (section.init && section.init_names.empty())
     throw InputError(*section.init, "would give nothing: " + name + ".init_names is empty",
                      "name tensors, or * for all, or leave init out");
@@ -61,7 +78,7 @@ Bundle train_run(RunDir& run, const TrainConfig& config, const TrainingData& dat
       options);
 }
 
-std::vector<StageForecast> forecast(TrainConfig config, const TrainingData& data) {
+std::vector<StageForecast> forecast(TrainConfig config, const TrainingData& data, bool validate) {
   std::vector<StageForecast> out;
   Bundle so_far;
   for (const std::string& name : config.stages) {
@@ -70,7 +87,7 @@ std::vector<StageForecast> forecast(TrainConfig config, const TrainingData& data
     const auto stage = make_stage(config, name, data, &so_far);
     if (stage == nullptr) continue;
     so_far.add(stage->result());
-    out.push_back(forecast(*stage, config.precision, true));
+    out.push_back(forecast(*stage, config.precision, validate));
     out.back().before *= left_out;
   }
   return out;

@@ -22,7 +22,8 @@ struct TrainingData {
 
 /// A stage, with the weights that it starts from. Null if the stage is taken as it is; then its
 /// networks are put into `so_far`. InputError: the weights do not fit or hold nothing for the
-/// stage, or the stage reads another one that does not come before it.
+/// stage, the stage reads another one that does not come before it, or loop.monitor names a figure
+/// that the stage does not measure.
 std::unique_ptr<Stage> make_stage(const TrainConfig& config, const std::string& name,
                                   const TrainingData& data, Bundle* so_far);
 
@@ -36,8 +37,10 @@ Bundle train_run(RunDir& run, const TrainConfig& config, const TrainingData& dat
                  TrainOptions options);
 
 /// What each stage that is trained would cost, measured on some of its steps. A stage that reads
-/// the networks of another gets them untrained, which changes no time.
-std::vector<StageForecast> forecast(TrainConfig config, const TrainingData& data);
+/// the networks of another gets them untrained, which changes no time. `validate`: one validation
+/// of each is measured, too.
+std::vector<StageForecast> forecast(TrainConfig config, const TrainingData& data,
+                                    bool validate = true);
 
 struct StoreTraining {
   Bundle bundle;

@@ -1,0 +1,106 @@
+#include "datasets/importers/rigs/gltf_own_rig.h"
+
+#include <algorithm>
+
+namespace restage {
+
+FingerBones rig_fingers(const Gltf& file, const GltfRig& rig) {
+  std::vector<std::string> names;
+  std::vector<int> parents;
+  for (const GltfNode& node : file.nodes) {
+    names.push_back(file.humanoid.empty() ? node.name : "");
+    parents.push_back(node.parent);
+  }
+  for (const auto& [name, node] : file.humanoid) names[static_cast<size_t>(node)] = name;
+  return find_fingers(names, parents, {rig.node[kLeftWrist], rig.node[kRightWrist]});
+}
+
+FingerTurns rig_fingers_at(const GltfRig& rig, const FingerBones& bones,
+                           const GltfTransforms& world) {
+  FingerTurns out;
+  for (size_t k = 0; k < out.size(); ++k) {
+    if (bones[k] < 0) continue;
+    const auto n = static_cast<size_t>(bones[k]);
+    const Mat3 from_t =
+        rotation_of(world[n].linear()) * rotation_of(rig.t_pose[n].linear()).transpose();
+    out[k] = rig.turn * from_t * rig.turn.transpose();
+  }
+  return out;
+}
+
+GltfOwnRig::GltfOwnRig(Gltf file, GltfRig rig) : file_(std::move(file)), rig_(std::move(rig)) {
+  joint_of_.assign(file_.nodes.size(), -1);
+  for (size_t j = 1; j < kJoints; ++j)
+    if (rig_.offset[j].isZero()) joint_of_[static_cast<size_t>(rig_.node[j])] = static_cast<int>(j);
+  // A first spine bone that carries the legs turns with the pelvis, or the legs would be moved.
+  for (const int node : {rig_.node[kPelvis], rig_.hips})
+    joint_of_[static_cast<size_t>(node)] = kPelvis;
+  finger_of_.assign(file_.nodes.size(), -1);
+  const FingerBones fingers = rig_fingers(file_, rig_);
+  for (size_t k = 0; k < fingers.size(); ++k)
+    if (fingers[k] >= 0) finger_of_[static_cast<size_t>(fingers[k])] = static_cast<int>(k);
+  const GltfTransforms t_pose = world(nullptr);
+  mesh_ = gltf_mesh(file_, t_pose);
+  for (Point& p : mesh_.vertices) p = rig_.to_ours(p.cast<double>()).cast<float>();
+  for (size_t j = 0; j < kJoints; ++j) rest_[j] = joint_at(t_pose, j);
+  const Vec3 moved = put_on_floor(mesh_, rest_[kPelvis]);
+  for (Vec3& x : rest_) x -= moved;
+}
+
+/// How a node is turned from the T-pose, in our axes; nothing: it keeps its rest.
+std::optional<Mat3> GltfOwnRig::turn_of(size_t node, const Rotations& global,
+                                        const FingerTurns* fingers) const {
+  if (const int j = joint_of_[node]; j >= 0) return global[static_cast<size_t>(j)];
+  if (const int k = finger_of_[node]; k >= 0 && fingers != nullptr)
+    return (*fingers)[static_cast<size_t>(k)];
+  return std::nullopt;
+}
+
+GltfTransforms GltfOwnRig::world(const Pose* pose, const FingerTurns* fingers,
+                                 NodeTurns* turns) const {
+  Rotations global;
+  global.fill(Mat3::Identity());
+  if (pose != nullptr) global = to_global(pose->local);
+  GltfTransforms out(file_.nodes.size());
+  for (size_t n = 0; n < out.size(); ++n) {
+    const GltfNode& node = file_.nodes[n];
+    const Eigen::Affine3d parent =
+        node.parent < 0 ? Eigen::Affine3d::Identity() : out[static_cast<size_t>(node.parent)];
+    GltfNode moved = node;
+    if (const std::optional<Mat3> turn = turn_of(n, global, fingers)) {
+      const Mat3 in_file = rig_.turn.transpose() * *turn * rig_.turn;
+      const Mat3 wanted = in_file * rotation_of(rig_.t_pose[n].linear());
+      moved.rotation = Quat(rotation_of(parent.linear()).transpose() * wanted).normalized();
+      if (turns != nullptr) turns->local.emplace_back(node.number, moved.rotation);
+    }
+    if (pose != nullptr && static_cast<int>(n) == rig_.hips) {
+      moved.translation = parent.inverse() * Vec3(rig_.turn.transpose() * pose->root / rig_.scale);
+      if (turns != nullptr) turns->hips = moved.translation;
+    }
+    out[n] = parent * moved.local();
+  }
+  return out;
+}
+
+Vec3 GltfOwnRig::joint_at(const GltfTransforms& world, size_t j) const {
+  const auto n = static_cast<size_t>(rig_.node[j]);
+  const Mat3 from_t = world[n].linear() * rig_.t_pose[n].linear().inverse();
+  return rig_.to_ours(world[n].translation() + from_t * rig_.offset[j]);
+}
+
+void GltfOwnRig::place(const Pose& pose, const FingerTurns* fingers, Joints* joints,
+                       Points* vertices) const {
+  const GltfTransforms nodes = world(&pose, fingers);
+  for (size_t j = 0; j < kJoints; ++j) (*joints)[j] = joint_at(nodes, j);
+  if (vertices == nullptr) return;
+  *vertices = gltf_mesh(file_, nodes).vertices;
+  for (Point& p : *vertices) p = rig_.to_ours(p.cast<double>()).cast<float>();
+}
+
+NodeTurns GltfOwnRig::turns(const Pose& pose, const FingerTurns* fingers) const {
+  NodeTurns out;
+  world(&pose, fingers, &out);
+  return out;
+}
+
+}  // namespace restage

@@ -1,0 +1,63 @@
+// A glTF character on its own nodes: posed as a program does that plays the file.
+#pragma once
+
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "datasets/importers/rigs/finger_bones.h"
+#include "datasets/importers/rigs/gltf_rig.h"
+#include "nn/geometry/own_rig.h"
+
+namespace restage {
+
+/// Nodes of the fingers, by VRM's list of bones or by their names.
+FingerBones rig_fingers(const Gltf& file, const GltfRig& rig);
+/// Their turns from the T-pose, our axes, when the nodes are at `world`.
+FingerTurns rig_fingers_at(const GltfRig& rig, const FingerBones& bones,
+                           const GltfTransforms& world);
+
+/// How the nodes of a pose are turned: what an animation of the file says.
+struct NodeTurns {
+  /// Numbers of nodes in the file, parents first, and their rotations against their parents.
+  std::vector<std::pair<int, Quat>> local;
+  Vec3 hips = Vec3::Zero();  ///< translation of hips_node() against its parent, the file's units
+};
+
+/// The formula: a node of joint j has the world rotation D_j T, where D_j is the joint's turn from
+/// the T-pose and T the node's world rotation in the T-pose; so of fingers. Only the hips are
+/// moved. All other nodes keep their local transform of the file.
+class GltfOwnRig final : public OwnRig {
+ public:
+  /// `rig`: find_rig() of `file`.
+  GltfOwnRig(Gltf file, GltfRig rig);
+
+  const Mesh& mesh() const override { return mesh_; }
+  const Joints& rest() const override { return rest_; }
+  SkinWeights weights() const override { return joint_weights(file_, rig_); }
+  void place(const Pose& pose, const FingerTurns* fingers, Joints* joints,
+             Points* vertices) const override;
+
+  int hips_node() const { return file_.nodes[static_cast<size_t>(rig_.hips)].number; }
+  /// `fingers` may be null.
+  NodeTurns turns(const Pose& pose, const FingerTurns* fingers) const;
+  const Gltf& file() const { return file_; }
+  const GltfRig& rig() const { return rig_; }
+
+ private:
+  /// From each node to the file's world. Without a pose: the T-pose, hips where the file has them.
+  GltfTransforms world(const Pose* pose, const FingerTurns* fingers = nullptr,
+                       NodeTurns* turns = nullptr) const;
+  std::optional<Mat3> turn_of(size_t node, const Rotations& global,
+                              const FingerTurns* fingers) const;
+  Vec3 joint_at(const GltfTransforms& world, size_t j) const;
+
+  Gltf file_;
+  GltfRig rig_;
+  std::vector<int> joint_of_;   ///< per node: the joint that turns it, or -1
+  std::vector<int> finger_of_;  ///< the same of fingers
+  Mesh mesh_;
+  Joints rest_;
+};
+
+}  // namespace restage

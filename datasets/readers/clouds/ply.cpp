@@ -1,0 +1,289 @@
+#include <array>
+#include <cmath>
+
+#include "datasets/readers/clouds/mesh_parsers.h"
+#include "datasets/readers/errors.h"
+#include "datasets/readers/text/numbers.h"
+#include "datasets/readers/text/text.h"
+#include "datasets/readers/text/word_lines.h"
+
+namespace restage {
+namespace {
+
+const char* const kExportAgain = "export the file again";
+
+enum class Format { ascii, little, big };
+struct Property {
+  std::string name;
+  const Number* type = nullptr;
+  const Number* count = nullptr;  // of a list: the kind of its length
+};
+
+struct Element {
+  std::string name;
+  uint64_t count = 0;
+  std::vector<Property> properties;
+};
+
+struct PlyHeader {
+  Format format = Format::ascii;
+  std::vector<Element> elements;
+};
+
+/// The kind of number of this name; null for an unknown one.
+const Number* number_named(std::string_view name) {
+  struct Named {
+    std::string_view old_name, name;
+    const Number* type;
+  };
+  static constexpr Named kNames[] = {
+      {"char", "int8", &kNumber<int8_t>},    {"uchar", "uint8", &kNumber<uint8_t>},
+      {"short", "int16", &kNumber<int16_t>}, {"ushort", "uint16", &kNumber<uint16_t>},
+      {"int", "int32", &kNumber<int32_t>},   {"uint", "uint32", &kNumber<uint32_t>},
+      {"float", "float32", &kNumber<float>}, {"double", "float64", &kNumber<double>},
+      {"int64", "int64", &kNumber<int64_t>}, {"uint64", "uint64", &kNumber<uint64_t>}};
+  for (const Named& known : kNames)
+    if (name == known.old_name || name == known.name) return known.type;
+  return nullptr;
+}
+
+// ---- header ------------------------------------------------------------------------------------
+
+Property parse_property(std::string_view line, const std::string& where) {
+  Property property;
+  std::string_view word = text::take_word(line);
+  if (word == "list") {
+    const std::string_view count = text::take_word(line);
+    property.count = number_named(count);
+    if (property.count == nullptr || !property.count->integer)
+      throw InputError(where, "unknown type " + text::quote(count) + " of a list's length",
+                       kExportAgain);
+    word = text::take_word(line);
+  }
+  property.type = number_named(word);
+  if (property.type == nullptr)
+    throw InputError(where, "unknown property type " + text::quote(word), kExportAgain);
+  property.name = text::take_word(line);
+  return property;
+}
+
+Element parse_element(std::string_view line, const std::string& where) {
+  Element element;
+  element.name = text::take_word(line);
+  const std::string_view word = text::take_word(line);
+  int64_t count = 0;
+  if (!text::parse(word, count) || count < 0)
+    throw InputError(
+        where, "impossible count " + text::quote(word) + " of element " + text::quote(element.name),
+        kExportAgain);
+  element.count = static_cast<uint64_t>(count);
+  return element;
+}
+
+Format parse_format(std::string_view line, const std::string& where) {
+  const std::string_view name = text::take_word(line);
+  if (name == "ascii") return Format::ascii;
+  if (name == "binary_little_endian") return Format::little;
+  if (name == "binary_big_endian") return Format::big;
+  throw InputError(where, "unknown PLY format " + text::quote(name),
+                   "use ascii or a binary format");
+}
+
+PlyHeader parse_header(text::Lines& lines, const std::string& path) {
+  PlyHeader header;
+  bool has_format = false;
+  std::string_view line;
+  lines.next(line);  // the magic word, checked by the caller
+  while (lines.next(line)) {
+    const std::string where = cat(path, ":", lines.number());
+    const std::string_view word = text::take_word(line);
+    if (word == "end_header") {
+      if (!has_format) throw InputError(where, "the PLY header names no format", kExportAgain);
+      return header;
+    }
+    if (word.empty() || word == "comment" || word == "obj_info") continue;
+    if (word == "format") {
+      header.format = parse_format(line, where);
+      has_format = true;
+    } else if (word == "element") {
+      header.elements.push_back(parse_element(line, where));
+    } else if (word == "property" && !header.elements.empty()) {
+      header.elements.back().properties.push_back(parse_property(line, where));
+    } else {
+      throw InputError(where, "unknown PLY header line " + text::quote(word), kExportAgain);
+    }
+  }
+  throw InputError(path, "is cut short inside the PLY header", kExportAgain);
+}
+
+// ---- rows --------------------------------------------------------------------------------------
+
+/// Gives the values of one element's rows, whatever the encoding.
+class Rows {
+ public:
+  Rows(text::Lines& lines, const PlyHeader& header, const std::string& path)
+      : lines_(lines), bytes_(lines.rest()), format_(header.format), path_(path) {}
+
+  /// InputError if what is left of the file cannot hold the rows of the element.
+  void begin(const Element& element) {
+    element_ = &element;
+    row_ = 0;
+    uint64_t smallest = 0;
+    for (const Property& p : element.properties)
+      smallest += format_ == Format::ascii ? 2 : (p.count ? p.count : p.type)->bytes;
+    const size_t left = format_ == Format::ascii ? lines_.rest().size() + 1 : bytes_.size();
+    if (element.count > 0 && smallest == 0)
+      throw InputError(path_, "element " + text::quote(element.name) + " has no properties",
+                       kExportAgain);
+    if (element.count > 0 && element.count > left / smallest) throw_short();
+  }
+
+  void begin_row() {
+    ++row_;
+    if (format_ != Format::ascii) return;
+    do {
+      if (!lines_.next(line_)) throw_short();
+    } while (line_.find_first_not_of(" \t\r") == std::string_view::npos);
+  }
+
+  void end_row() {
+    if (format_ == Format::ascii && !text::take_word(line_).empty())
+      throw InputError(where(), "has more values than the header says", kExportAgain);
+  }
+
+  double next(const Number& type) {
+    return format_ == Format::ascii ? next_word() : next_bytes(type);
+  }
+
+  /// Length of a list, checked against what is left.
+  size_t next_length(const Property& property) {
+    const double n = next(*property.count);
+    const size_t left =
+        format_ == Format::ascii ? line_.size() : bytes_.size() / property.type->bytes;
+    if (!(n >= 0) || n != std::floor(n))
+      throw InputError(where(), "a list has an impossible length", kExportAgain);
+    if (n > static_cast<double>(left)) throw_short();
+    return static_cast<size_t>(n);
+  }
+
+  std::string where() const {
+    return format_ == Format::ascii ? cat(path_, ":", lines_.number())
+                                    : cat(path_, ":", element_->name.substr(0, 40), " ", row_ - 1);
+  }
+
+ private:
+  double next_word() {
+    const std::string_view word = text::take_word(line_);
+    double value = 0;
+    if (word.empty())
+      throw InputError(where(), "has fewer values than the header says", kExportAgain);
+    if (!text::parse(word, value)) text::throw_no_number(word, where());
+    return value;
+  }
+
+  double next_bytes(const Number& type) {
+    if (bytes_.size() < type.bytes) throw_short();
+    const double value = type.at(bytes_.data(), format_ == Format::big);
+    bytes_.remove_prefix(type.bytes);
+    return value;
+  }
+
+  [[noreturn]] void throw_short() const {
+    throw InputError(path_,
+                     cat("is cut short: element ", text::quote(element_->name), " should have ",
+                         element_->count, " rows"),
+                     kExportAgain);
+  }
+
+  text::Lines& lines_;
+  std::string_view bytes_, line_;
+  Format format_;
+  const std::string& path_;
+  const Element* element_ = nullptr;
+  uint64_t row_ = 0;
+};
+
+void skip_property(Rows& rows, const Property& property) {
+  const size_t n = property.count ? rows.next_length(property) : 1;
+  for (size_t i = 0; i < n; ++i) rows.next(*property.type);
+}
+
+void read_vertices(Rows& rows, const Element& element, const std::string& path, const Vec3& origin,
+                   NonFinite how, Points& points) {
+  std::array<int, 3> axis_seen = {0, 0, 0};
+  std::vector<int> axis_of;  // for each property: 0, 1, 2 or -1
+  for (const Property& p : element.properties) {
+    const size_t axis = p.count ? std::string::npos : std::string("xyz").find(lower_case(p.name));
+    axis_of.push_back(p.name.size() == 1 && axis < 3 ? static_cast<int>(axis) : -1);
+    if (axis_of.back() >= 0) ++axis_seen[axis_of.back()];
+  }
+  if (axis_seen != std::array<int, 3>{1, 1, 1})
+    throw InputError(path, "the vertices do not have the properties x, y and z", kExportAgain);
+  points.reserve(points.size() + element.count);
+  for (uint64_t i = 0; i < element.count; ++i) {
+    rows.begin_row();
+    Point point = Point::Zero();
+    for (size_t k = 0; k < axis_of.size(); ++k) {
+      if (axis_of[k] < 0)
+        skip_property(rows, element.properties[k]);
+      else
+        point[axis_of[k]] = text::coordinate(
+            rows.next(*element.properties[k].type) - origin[axis_of[k]],
+            [&] { return rows.where(); }, how);
+    }
+    rows.end_row();
+    points.push_back(point);
+  }
+}
+
+/// Indices are kept as they stand (checked to fit); the range is checked when all vertices are
+/// known.
+void read_faces(Rows& rows, const Element& element, std::vector<Triangle>& faces) {
+  std::vector<int32_t> corners;
+  for (uint64_t i = 0; i < element.count; ++i) {
+    rows.begin_row();
+    for (const Property& p : element.properties) {
+      if (!p.count || (p.name != "vertex_indices" && p.name != "vertex_index")) {
+        skip_property(rows, p);
+        continue;
+      }
+      const size_t n = rows.next_length(p);
+      corners.clear();
+      for (size_t k = 0; k < n; ++k) {
+        const double index = rows.next(*p.type);
+        if (!(index >= 0 && index < 2147483648.0) || index != std::floor(index))
+          throw InputError(rows.where(), "a face index is out of range", kExportAgain);
+        corners.push_back(static_cast<int32_t>(index));
+      }
+      text::add_fan(corners, n, faces);
+    }
+    rows.end_row();
+  }
+}
+
+}  // namespace
+
+Mesh parse_ply(std::string_view content, const std::string& path, const Vec3& origin,
+               NonFinite how) {
+  text::Lines lines(content);
+  const PlyHeader header = parse_header(lines, path);
+  Rows rows(lines, header, path);
+  Mesh mesh;
+  for (const Element& element : header.elements) {
+    rows.begin(element);
+    if (element.name == "vertex") {
+      read_vertices(rows, element, path, origin, how, mesh.vertices);
+    } else if (element.name == "face") {
+      read_faces(rows, element, mesh.faces);
+    } else {
+      for (uint64_t i = 0; i < element.count; ++i) {
+        rows.begin_row();
+        for (const Property& p : element.properties) skip_property(rows, p);
+        rows.end_row();
+      }
+    }
+  }
+  return mesh;
+}
+
+}  // namespace restage

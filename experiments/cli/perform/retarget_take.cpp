@@ -1,0 +1,154 @@
+// restage retarget of a source that has a skeleton: BVH, AMC, glTF, VRM animations, AMASS, motions.
+#include "autograd/base/log.h"
+#include "datasets/doctor/examine.h"
+#include "datasets/importers/motions/skeleton_take.h"
+#include "datasets/readers/errors.h"
+#include "datasets/readers/text/text.h"
+#include "experiments/cli/output.h"
+#include "experiments/cli/perform/retarget.h"
+#include "experiments/cli/perform/retarget_words.h"
+#include "experiments/text.h"
+#include "infer/frame_rate.h"
+
+namespace restage::cli {
+namespace {
+
+/// What says how clouds are looked at says nothing of a skeleton.
+void check_words(const RetargetCommand& c) {
+  const RetargetOptions usual;
+  const auto refuse = [&](const std::string& option) {
+    throw InputError(c.source.path,
+                     "has a skeleton, which is taken over as it is; " + option + " is for clouds",
+                     "leave " + option + " out, or add --from-surface");
+  };
+  const bool many = text::ends_in(c.source.path, {".h5", ".hdf5"});
+  if (c.source.sequence && !many) refuse("--sequence");
+  if (c.system != "chain") refuse("--system");
+  if (c.options.samples != usual.samples) refuse("--samples");
+  if (c.options.anchor != usual.anchor) refuse("--anchor");
+  if (c.options.min_confidence != usual.min_confidence) refuse("--min-confidence");
+  if (!c.options.foot_lock) refuse("--no-foot-lock");
+  if (!c.options.steady_bones) refuse("--no-steady-bones");
+  if (!c.options.late) refuse("--online");
+  if (!c.options.keep_limbs) refuse("--no-keep-limbs");
+  if (c.profile) refuse("--profile");
+  if (!c.body_model.empty() && !text::ends_in(c.source.path, {".npz"}))
+    throw InputError(c.source.path, "has a skeleton of its own", "leave --body-model out");
+  if (!c.asf.empty() && !text::ends_in(c.source.path, {".amc", ".amc.xz"}))
+    throw InputError(c.source.path, "has a skeleton of its own", "leave --asf out");
+  if (many && c.source.fps && *c.source.fps != kFps)
+    throw InputError(c.source.path, "has 30 frames a second, which --fps cannot change",
+                     "leave --fps out");
+  if (is_gltf_name(c.source.path) && c.source.fps && *c.source.fps != kFps)
+    throw InputError(c.source.path, "states its key times, which --fps cannot change",
+                     "leave --fps out");
+}
+
+/// Where source and target have skeletons, what says how networks answer says nothing.
+void check_no_network(const RetargetCommand& c) {
+  for (const auto& [given, option] : {std::pair(!c.weights.empty(), "--weights"),
+                                      {!c.rest.empty(), "--rest"},
+                                      {c.device != "cpu", "--device"}})
+    if (given)
+      throw InputError(c.source.path,
+                       cat("has a skeleton as the target has, so no network is asked; ", option,
+                           " is for networks"),
+                       cat("leave ", option, " out, or add --from-surface"));
+}
+
+/// Readers name the options of `data import`; those of a source are called otherwise here.
+template <class Work>
+auto as_source(const Work& work) {
+  try {
+    return work();
+  } catch (const InputError& error) {
+    const auto ours = [](std::string text) {
+      for (const std::string option : {"--bones", "--up"}) {
+        const std::string other = "--source" + option.substr(1);
+        for (size_t at = text.find(option); at != std::string::npos;
+             at = text.find(option, at + other.size()))
+          text.replace(at, option.size(), other);
+      }
+      return text;
+    };
+    throw InputError(error.where(), ours(error.cause()), ours(error.mend()));
+  }
+}
+
+TakeOptions options_of(const RetargetCommand& c, const Joints& performer) {
+  TakeOptions out;
+  if (c.source.scale != 1) out.motion.scale = c.source.scale;
+  if (c.source.up != "y") out.motion.rest.up = parse_axis(c.source.up, "--source-up");
+  if (c.source.fps) out.motion.fps = *c.source.fps;
+  out.motion.force = c.options.force;
+  out.motion.profile = c.source_bones;
+  out.motion.fingers = true;
+  out.clip = c.source.clip;
+  out.sequence = c.source.sequence;
+  out.body_model = c.body_model;
+  out.asf = c.asf;
+  out.like = performer;
+  return out;
+}
+
+}  // namespace
+
+bool has_take(const RetargetCommand& c, std::string* why) {
+  return as_source([&] { return holds_take(c.source.path, c.source_bones, why); });
+}
+
+Retargeted run_take(const RetargetCommand& c, const Common& common, const RetargetCaller& caller) {
+  check_words(c);
+  TargetMesh target = read_target(c.target, c.bones);
+  check_kept(c, target);
+  if (target.own) check_no_network(c);
+  SystemInput input;
+  if (!target.own) {
+    if (!c.options.force) check_target(target.mesh, c.target, target.known());
+    input = load_input(c, common);
+  }
+  const SinkOptions to = sink_options(c, input, target);
+  std::unique_ptr<System> system;  // poses a target that has no rig of its own
+  if (!target.own) system = system_for(c, std::move(input), target);
+  SkinWeights weights;
+  if (target.own) weights = target.own->weights();
+  const Joints& rest = target.own ? target.own->rest() : *system->target_joints();
+  SkeletonTake take = as_source([&] { return read_take(c.source.path, options_of(c, rest)); });
+  put_on_floor(take, rest);
+  std::optional<SystemRig> rig;
+  if (target.own) rig.emplace(SystemRig{rest, weights});
+  const Shown shown{target.own ? target.own->mesh() : system->target(),
+                    target.own ? &*rig : system->rig()};
+  std::optional<SourceRecord> source;
+  if (is_gltf_name(c.source.path)) source = c.source;
+  const Sink sink = caller.sink ? in_joints(to, caller.sink(shown))
+                                : make_sink(to, shown, source, take.name, c.target, target.own);
+  say_take(take);
+  say_target(target);
+  int64_t frames = 0;
+  for (size_t f = 0; f < take.frames.size(); f += static_cast<size_t>(c.to.every)) {
+    caller.look();
+    RetargetedFrame frame;
+    frame.pose = perform_take(take, f, rest);
+    frame.joints.emplace();
+    if (!take.fingers.empty()) frame.fingers = take.fingers[f];
+    if (target.own) {
+      target.own->place(frame.pose, frame.fingers ? &*frame.fingers : nullptr, &*frame.joints,
+                        &frame.vertices);
+    } else {
+      *frame.joints = forward_kinematics(rest, frame.pose).joints;
+      frame.vertices = system->posed(frame.pose);
+    }
+    sink.push(frame);
+    ++frames;
+  }
+  sink.commit({});
+  if (c.to.every == 1) frames = FrameRate::count(frames, c.to.rate());
+  const Json document = {{"out", c.to.out},   {"source_frames", take.frames.size()},
+                         {"frames", frames},  {"fps", c.to.rate()},
+                         {"clip", take.name}, {"from", "skeleton"}};
+  return {document, "wrote " + c.to.out + ": " + counted(frames, "frame") +
+                        ", the motion of the source's skeleton\n"};
+}
+
+}  // namespace restage::cli
