@@ -48,6 +48,16 @@ ImportSummary import_data_folder(const std::string& folder, bool bodies, bool cl
   return summary;
 }
 
+ImportSummary import_packed_clips(const std::string& source, const std::string& out,
+                                  const ImportOptions& options) {
+  check_options({InputKind::packed_clips}, source, options);
+  ImportSummary summary;
+  ImportWriter writer(out, data_folder_info(false, true), summary);
+  writer.add(source, {}, import_cmu(source, options.without_sources));
+  writer.commit();
+  return summary;
+}
+
 ImportSummary import_folder(const std::string& source, const std::string& out,
                             const ImportOptions& options) {
   std::error_code ignored;
@@ -70,6 +80,7 @@ ImportSummary import_file(const std::string& source, const std::string& out,
                           const ImportOptions& options) {
   refuse_foreign_content(source);
   if (is_recording_name(source)) return import_recordings({source}, source, out, options);
+  if (is_hdf5(source) && is_packed_clips(source)) return import_packed_clips(source, out, options);
   if (holds_scans(source)) return import_array_file(source, out, options);
   if (is_pickle_name(source)) refuse_pickle(source);
   if (source.ends_with(".asf") || source.ends_with(".asf.xz"))

@@ -15,8 +15,9 @@ namespace restage {
 struct ImportOptions {
   /// Of BVH and AMC files; which of them other kinds take: import_options.cpp.
   MotionOptions motion;
-  std::string asf;      ///< skeleton of AMC files; empty: the one beside each
-  std::string clip;     ///< of glTF files: this animation only; empty: all
+  std::string asf;                           ///< skeleton of AMC files; empty: the one beside each
+  std::string clip;                          ///< of glTF files: this animation only; empty: all
+  std::vector<std::string> without_sources;  ///< of packed clips: import_cmu()
   std::string garment;  ///< dress the bodies in this garment of body/clothes; empty: skin
   std::string license = "unknown";  ///< of all but a data folder, whose licence is known
   /// Regular expression (ECMAScript) whose first group in a file's path below the folder names who
@@ -47,6 +48,7 @@ bool is_importable(const std::string& source);
 /// Writes `out` (whole or not at all) from `source`, which is
 /// - a folder laid out like the project's data folder: all bodies of body/makehuman.h5 by
 ///   body/bodies.csv and all clips of cmu/clips30.h5 (one of the two may be absent);
+/// - packed clips of CMU (cmu.h), as in such a folder: their motions;
 /// - a recording (.bvh, or .amc with its .asf; any may end in .xz): one motion;
 /// - a rigged character (.glb, .gltf, .vrm, .fbx): its body and its animations (gltf_character.h);
 /// - a tree of folders of recordings and characters, in the order of their names;

@@ -17,7 +17,7 @@ std::filesystem::path absolute_path(const std::filesystem::path& path);
 /// Licence as given, provenance by the source's name.
 FileInfo file_info(const std::string& source, const ImportOptions& options);
 
-enum class InputKind { data_folder, bvh, amc, character, amass, body_model, scans };
+enum class InputKind { data_folder, packed_clips, bvh, amc, character, amass, body_model, scans };
 /// InputError for an option that none of these kinds takes: none is ignored without a word.
 void check_options(const std::set<InputKind>& kinds, const std::string& source,
                    const ImportOptions& options);

@@ -12,8 +12,10 @@
 #include "datasets/sampling/dress.h"
 #include "datasets/sampling/intruder.h"
 #include "datasets/sampling/memory.h"
+#include "datasets/sampling/partial.h"
 #include "datasets/sampling/skirt.h"
 #include "datasets/sampling/things.h"
+#include "nn/geometry/skeleton.h"
 
 namespace restage {
 namespace {
@@ -38,6 +40,11 @@ CloudConfig checked(const CloudConfig& c) {
   for (const double share : {c.things, c.cut_floor, c.smoothed, c.skirts})
     check_setting("cloud", share >= 0 && share <= 1, "things, cut_floor, smoothed, skirts",
                   "0 to 1");
+  for (const double share : {c.ceiling, c.cropped, c.sparse, c.noisy, c.tilted, c.upright})
+    check_setting("cloud", share >= 0 && share <= 1,
+                  "ceiling, cropped, sparse, noisy, tilted, upright", "0 to 1");
+  check_setting("cloud", c.most_noise >= c.noise && std::isfinite(c.most_noise), "most_noise",
+                "metres, at least noise");
   check_setting("cloud", c.min_fraction > 0 && c.min_fraction <= 1, "min_fraction", "above 0 to 1");
   return c;
 }
@@ -164,7 +171,21 @@ CloudSubject CloudSampler::subject(int64_t index) const {
   out.cut_floor = capture.uniform() < config_.cut_floor && !out.rest;
   out.smoothed = capture.uniform() < config_.smoothed ? capture.uniform(0.2, 1.0) : 0;
   out.skirt = capture.uniform() < config_.skirts;
+  make_harder(index, &out);
   return out;
+}
+
+void CloudSampler::make_harder(int64_t index, CloudSubject* subject) const {
+  Rng rng(key_.fold(static_cast<uint64_t>(index)).fold("harder"));
+  const bool tilted = rng.uniform() < config_.tilted, upright = rng.uniform() < config_.upright;
+  subject->ceiling = rng.uniform() < config_.ceiling;
+  subject->cropped = rng.uniform() < config_.cropped && !subject->rest;
+  subject->sparse = rng.uniform() < config_.sparse;
+  const double root = rng.uniform(std::sqrt(config_.noise), std::sqrt(config_.most_noise));
+  if (rng.uniform() < config_.noisy) subject->noise = root * root;
+  if (subject->rest) return;
+  if (upright) subject->shown = standing_turn(true_joints(*subject));
+  if (tilted) subject->shown = draw_tilt(rng) * subject->shown;
 }
 
 Pose CloudSampler::pose(const CloudSubject& subject) const {
@@ -264,8 +285,8 @@ CloudSampler::Seen CloudSampler::see(const CloudSubject& subject, size_t n, cons
   out.which.resize(out.points.size());
   std::iota(out.which.begin(), out.which.end(), size_t{0});
   if (subject.sensor != Sensor::none)
-    out.points = sensed(subject.sensor, out.points, drawn.normals, n, scene.fold("cameras"),
-                        key.fold("sensor"), &out.which);
+    out.points = sensed({subject.sensor, subject.ceiling}, out.points, drawn.normals, n,
+                        scene.fold("cameras"), key.fold("sensor"), &out.which);
   const float floor = lowest(out.points);
   if (subject.thing)
     put_thing(scene.fold("thing"), key.fold("thing"), subject.sensor != Sensor::none, &out);
@@ -273,8 +294,23 @@ CloudSampler::Seen CloudSampler::see(const CloudSubject& subject, size_t n, cons
   if (subject.cut_floor)
     cut_below(floor + static_cast<float>(Rng(scene.fold("floor")).uniform(0.01, 0.08)), out.points,
               out.which);
-  add_noise(key.fold("noise"), config_.noise, out.points);
+  if (subject.cropped) {
+    Rng rng(scene.fold("cut"));
+    cut_away(draw_cut(rng), out.points, out.which);
+  }
+  if (subject.sparse) {
+    Rng rng(scene.fold("sparse"));
+    thin_out(rng, n, out.points, out.which);
+  }
+  add_noise(key.fold("noise"), subject.noise > 0 ? subject.noise : config_.noise, out.points);
+  if (!subject.shown.isIdentity(0)) turn(subject.shown, &out);
   return out;
+}
+
+void CloudSampler::turn(const Mat3& by, Seen* seen) {
+  for (Point& p : seen->points) p = by.cast<float>() * p;
+  for (Vec3& joint : seen->joints) joint = by * joint;
+  for (Mat3& own : seen->turns) own = by * own;
 }
 
 /// A few points of the person make way for those of a limb: as many as a camera near it would see
@@ -319,7 +355,7 @@ Joints CloudSampler::true_joints(const CloudSubject& subject) const {
   Joints out =
       augmented(subject.augmentation,
                 subject.rest ? body.joints : forward_kinematics(body.joints, pose(subject)).joints);
-  for (Vec3& joint : out) joint *= subject.scale;
+  for (Vec3& joint : out) joint = subject.shown * (joint * subject.scale);
   return out;
 }
 

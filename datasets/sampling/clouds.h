@@ -31,6 +31,13 @@ struct CloudConfig {
   double cut_floor = 0;       ///< part whose lowest 1 to 8 cm were cut away with the floor
   double smoothed = 0;        ///< part whose surface a coarse volume has smoothed
   double skirts = 0;          ///< part with a skirt, or the lower part of a coat (skirt.h)
+  double ceiling = 0;  ///< part of what cameras see that they see from above, 40 to 90 degrees
+  double cropped = 0;  ///< part of which a desk or the picture's edge hides something (partial.h)
+  double sparse = 0;   ///< part with as few as 64 different points (partial.h)
+  double noisy = 0;    ///< part with more noise, up to most_noise
+  double most_noise = 0.045;  ///< metres
+  double tilted = 0;          ///< part that is turned about an axis along the floor (draw_tilt())
+  double upright = 0;         ///< part turned until the trunk is upright, as retarget shows people
   double remembered = 0;      ///< part with a memory of the frame before (CloudBatch::past)
   bool skin_weights = false;  ///< also fill CloudBatch::weights
   bool rotations = false;     ///< also fill CloudBatch::turns
@@ -75,6 +82,9 @@ struct CloudSubject {
   bool intruder = false;
   bool thing = false, cut_floor = false, skirt = false;
   double smoothed = 0;  ///< 0 to 1, of smoothing()
+  bool ceiling = false, cropped = false, sparse = false;
+  double noise = 0;               ///< metres; 0: CloudConfig::noise
+  Mat3 shown = Mat3::Identity();  ///< turns all that the sensors saw
   enum class Memory { none, drawn, asked } memory = Memory::none;
   size_t step_back = 1;  ///< how many frames ago the remembered one is
 };
@@ -118,6 +128,7 @@ class CloudSampler {
     Rotations turns;
   };
   Seen see(const CloudSubject& subject, size_t n, const RngKey& scene, const RngKey& key) const;
+  static void turn(const Mat3& by, Seen* seen);
   void intrude(const RngKey& scene, const RngKey& key, Seen* seen) const;
   void put_thing(const RngKey& scene, const RngKey& key, bool cameras, Seen* seen) const;
   /// One row of a batch.
@@ -129,6 +140,8 @@ class CloudSampler {
   void fill_past(const Row& row, const Point& centre, float* to) const;
   CloudBatch make(const std::vector<Row>& rows) const;
   Joints true_joints(const CloudSubject& subject) const;
+  /// What the shares from `ceiling` to `upright` say of sample `index`.
+  void make_harder(int64_t index, CloudSubject* subject) const;
 
   const Corpus& corpus_;
   CloudConfig config_;

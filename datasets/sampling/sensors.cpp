@@ -31,12 +31,13 @@ Camera camera_at(double azimuth, double height) {
   return out;
 }
 
-std::vector<Camera> draw_cameras(Sensor sensor, Rng& rng) {
+std::vector<Camera> draw_cameras(const Watch& watch, Rng& rng) {
   constexpr double kPi = std::numbers::pi;
   std::vector<Camera> out;
-  const auto height = [&] { return rng.uniform(-15, 40) * kPi / 180; };
+  const double least = watch.ceiling ? 40 : -15, most = watch.ceiling ? 90 : 40;
+  const auto height = [&] { return rng.uniform(least, most) * kPi / 180; };
   const double start = rng.uniform(0, 2 * kPi);
-  const auto count = sensor == Sensor::one_camera ? size_t{1} : 3 + rng.below(5);
+  const auto count = watch.sensor == Sensor::one_camera ? size_t{1} : 3 + rng.below(5);
   for (size_t k = 0; k < count; ++k)
     out.push_back(camera_at(start + 2 * kPi * (static_cast<double>(k) + 0.3 * rng.uniform(-1, 1)) /
                                         static_cast<double>(count),
@@ -126,12 +127,13 @@ size_t candidates(Sensor sensor, size_t n) {
   return sensor == Sensor::none ? n : sensor == Sensor::one_camera ? 7 * n / 2 : 2 * n;
 }
 
-Points sensed(Sensor sensor, const Points& points, const Points& normals, size_t n,
+Points sensed(const Watch& watch, const Points& points, const Points& normals, size_t n,
               const RngKey& camera_key, const RngKey& key, std::vector<size_t>* which) {
   Rng rng(key), camera_rng(camera_key);
-  std::vector<float> seen(points.size(), sensor == Sensor::none ? 1.0f : 0.0f);
+  const bool none = watch.sensor == Sensor::none;
+  std::vector<float> seen(points.size(), none ? 1.0f : 0.0f);
   const std::vector<Camera> cameras =
-      sensor == Sensor::none ? std::vector<Camera>{} : draw_cameras(sensor, camera_rng);
+      none ? std::vector<Camera>{} : draw_cameras(watch, camera_rng);
   for (const Camera& camera : cameras) look(camera, points, normals, &seen);
   if (!cameras.empty()) lose_part(points, rng, &seen);
   *which = draw(seen, n, rng);

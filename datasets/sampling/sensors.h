@@ -15,6 +15,11 @@ enum class Sensor {
   ring         ///< three to seven cameras around
 };
 
+struct Watch {
+  Sensor sensor = Sensor::none;
+  bool ceiling = false;  ///< cameras stand 40 to 90 degrees above the person, not -15 to 40
+};
+
 /// How many surface points to draw for `n` that a sensor sees.
 size_t candidates(Sensor sensor, size_t n);
 
@@ -23,7 +28,7 @@ size_t candidates(Sensor sensor, size_t n);
 /// the floor; some points lie too far along their ray, or anywhere. At least 64 points, if there
 /// are as many. Where the cameras stand is a function of `cameras`. `normals`: of length one, out
 /// of the surface. `which`: numbers of the points.
-Points sensed(Sensor sensor, const Points& points, const Points& normals, size_t n,
+Points sensed(const Watch& watch, const Points& points, const Points& normals, size_t n,
               const RngKey& cameras, const RngKey& key, std::vector<size_t>* which);
 
 }  // namespace restage

@@ -60,6 +60,14 @@ double trunk_turn(const Joints& a, const Joints& b) {
   return std::atan2(one.cross(other).norm(), one.dot(other));
 }
 
+Mat3 standing_turn(const Joints& joints) {
+  const Vec3 trunk = joints[kNeck] - joints[kPelvis];
+  if (!(trunk.norm() > 1e-6)) return Mat3::Identity();
+  const Vec3 along = trunk.normalized();
+  if (!(std::acos(std::clamp(along.y(), -1.0, 1.0)) > kTiltedTrunk)) return Mat3::Identity();
+  return Quat::FromTwoVectors(along, Vec3::UnitY()).toRotationMatrix();
+}
+
 namespace {
 
 /// From right to left, by shoulders and hips.

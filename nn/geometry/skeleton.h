@@ -70,6 +70,10 @@ std::array<std::array<double, 4>, kJoints> quaternions(const Rotations& rotation
 double leg_length(const Joints& joints);
 /// Angle between the trunks of two poses, from the pelvis to the neck, radians.
 double trunk_turn(const Joints& a, const Joints& b);
+/// Who is tilted by more, is shown to extractors with the trunk upright; radians.
+inline constexpr double kTiltedTrunk = 35 * M_PI / 180;
+/// The least turn that lets the trunk point up; exactly the identity where it is not tilted.
+Mat3 standing_turn(const Joints& joints);
 /// Angle about y by which a posed body faces away from +z (spec 3.3: across = left minus right
 /// shoulder plus left minus right hip), radians; 0 if it cannot be told.
 double heading_angle(const Joints& joints);

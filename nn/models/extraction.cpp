@@ -12,19 +12,9 @@ namespace {
 
 constexpr double kLost = 1;  // metres: nobody moves so far from one frame to the next
 
-constexpr double kTilted = 35 * M_PI / 180;  // of the trunk, from which on somebody is stood up
-constexpr double kUnsure = 0.6;              // confidence below which other ways up are looked at
-constexpr double kVerySure = 0.95;           // the same of a first frame
-constexpr double kSurer = 0.8;  // another way up is believed if its uncertainty is so much less
-
-/// The least turn that lets the trunk point up; exactly the identity where it nearly does.
-Mat3 standing(const Joints& joints) {
-  const Vec3 trunk = joints[kNeck] - joints[0];
-  if (!(trunk.norm() > 1e-6)) return Mat3::Identity();
-  const Vec3 along = trunk.normalized();
-  if (!(std::acos(std::clamp(along.y(), -1.0, 1.0)) > kTilted)) return Mat3::Identity();
-  return Quat::FromTwoVectors(along, Vec3::UnitY()).toRotationMatrix();
-}
+constexpr double kUnsure = 0.6;     // confidence below which other ways up are looked at
+constexpr double kVerySure = 0.95;  // the same of a first frame
+constexpr double kSurer = 0.8;      // another way up is believed if its uncertainty is so much less
 
 /// How unsure an answer is, metres. A trunk that points elsewhere than in the frame before, which
 /// was sure, counts as an answer that is half as sure.
@@ -111,7 +101,7 @@ SeenJoints JointExtractor::operator()(const Points& cloud, const std::string& so
   arrange(cloud, source);
   scale_ = options_.any_size && before != nullptr ? scale_for(before->joints) : 1;
   stand_up(before == nullptr || before->upright.isIdentity(0) ? Mat3(Mat3::Identity())
-                                                              : standing(before->joints));
+                                                              : standing_turn(before->joints));
   const auto look_well = [&] {
     const SeenJoints first = look(source, key, before);
     return options_.any_way_up && first.uncertainty ? surest(first, source, key, before) : first;
@@ -131,10 +121,11 @@ SeenJoints JointExtractor::surest(const SeenJoints& first, const std::string& so
                                   const RngKey& key, const SeenJoints* before) {
   // Who is seen for the first time upside down can look like somebody: more has to be sure.
   const bool anew = confidence(*first.uncertainty) < (before == nullptr ? kVerySure : kUnsure);
-  const Mat3 now = upright_, other = anew ? surest_way_up(source, key) : standing(first.joints);
+  const Mat3 now = upright_,
+             other = anew ? surest_way_up(source, key) : standing_turn(first.joints);
   const double apart = Eigen::AngleAxisd(other * now.transpose()).angle();
   stand_up(now);
-  if (apart < kTilted) return first;
+  if (apart < kTiltedTrunk) return first;
   stand_up(other);
   const SeenJoints second = look(source, key, before);
   if (doubt(second, before) < kSurer * doubt(first, before)) return second;
@@ -163,7 +154,7 @@ Mat3 JointExtractor::surest_way_up(const std::string& source, const RngKey& key)
   }
   std::copy_n(views_.begin() + static_cast<std::ptrdiff_t>(2 * best), 2, views_.begin());
   views_.resize(2);
-  return standing(combined(views_, false, true, source, values_).joints);
+  return standing_turn(combined(views_, false, true, source, values_).joints);
 }
 
 /// The answer to the arranged points in the scale and the way up of now.

@@ -43,7 +43,7 @@ TEST(SamplingSensors, SeeTheNearSideAndNothingInside) {
     for (const Sensor sensor : {Sensor::one_camera, Sensor::ring}) {
       std::vector<size_t> which;
       const Points seen =
-          sensed(sensor, balls.points, balls.normals, 400, RngKey{k, 0}, RngKey{k, 1}, &which);
+          sensed({sensor}, balls.points, balls.normals, 400, RngKey{k, 0}, RngKey{k, 1}, &which);
       ASSERT_EQ(seen.size(), which.size());
       EXPECT_LE(seen.size(), 400u);
       EXPECT_GE(seen.size(), 128u);

@@ -69,6 +69,7 @@ CloudConfig held_out(CloudConfig c, const SkeletonModel& model) {
   c.scale_jitter = 0;
   c.dressed = c.one_camera = c.camera_ring = c.recombined = c.intruder = c.remembered = c.bend = 0;
   c.things = c.cut_floor = c.smoothed = c.skirts = 0;
+  c.ceiling = c.cropped = c.sparse = c.noisy = c.tilted = c.upright = 0;
   c.rotations = true;
   return c;
 }

@@ -32,6 +32,17 @@ void visit(V& v, CloudConfig& c) {
     added("0", between(0, 1)));
   v("skirts", c.skirts, "part with a skirt, or the lower part of a coat",
     added("0", between(0, 1)));
+  v("ceiling", c.ceiling, "part of what cameras see that they see from above",
+    added("0", between(0, 1)));
+  v("cropped", c.cropped, "part of which a desk or the picture's edge hides something",
+    added("0", between(0, 1)));
+  v("sparse", c.sparse, "part with as few as 64 different points", added("0", between(0, 1)));
+  v("noisy", c.noisy, "part with more noise, up to most_noise", added("0", between(0, 1)));
+  v("most_noise", c.most_noise, "of noisy clouds, metres", added("0.045", at_least(0)));
+  v("tilted", c.tilted, "part turned about an axis along the floor, most of them by little",
+    added("0", between(0, 1)));
+  v("upright", c.upright, "part shown with the trunk upright, as retarget shows people",
+    added("0", between(0, 1)));
   v("remembered", c.remembered, "part with a memory of the frame before", between(0, 1));
   v("frame_step", c.frame_step, "only every so many frames of a motion (30: one a second)",
     between(1, 100000));

@@ -118,28 +118,59 @@ CmuClip convert(const RawClip& raw, bool with_joints, const std::string& where) 
   return out;
 }
 
-}  // namespace
+std::vector<std::string> clip_names(const h5::File& file) {
+  std::vector<std::string> out = file.children("/clips");
+  if (out.empty())
+    throw InputError(file.path() + ":/clips", "holds no clips", "give the CMU clips30.h5");
+  return out;
+}
 
-std::vector<CmuClip> read_cmu(const std::string& path, bool with_joints) {
-  const h5::File file = h5::File::open(path);
-  const std::vector<std::string> names = file.children("/clips");
-  if (names.empty())
-    throw InputError(path + ":/clips", "holds no clips", "give the CMU clips30.h5");
+std::vector<CmuClip> read_clips(const h5::File& file, const std::vector<std::string>& names,
+                                bool with_joints) {
   std::map<std::string, CmuSkeleton> skeletons;
   std::vector<RawClip> raw;
   for (const std::string& name : names) raw.push_back(read_clip(file, name, skeletons));
   std::vector<CmuClip> out(raw.size());
   parallel_for(raw.size(), 4, [&](int64_t begin, int64_t end) {
     for (int64_t k = begin; k < end; ++k)
-      out[k] = convert(raw[k], with_joints, path + ":/clips/" + raw[k].name);
+      out[k] = convert(raw[k], with_joints, file.path() + ":/clips/" + raw[k].name);
   });
   return out;
 }
 
-std::vector<Motion> import_cmu(const std::string& path) {
+std::vector<Motion> motions_of(std::vector<CmuClip> clips) {
   std::vector<Motion> out;
-  for (CmuClip& clip : read_cmu(path)) out.push_back(std::move(clip.motion));
+  for (CmuClip& clip : clips) out.push_back(std::move(clip.motion));
   return out;
+}
+
+}  // namespace
+
+std::vector<CmuClip> read_cmu(const std::string& path, bool with_joints) {
+  const h5::File file = h5::File::open(path);
+  return read_clips(file, clip_names(file), with_joints);
+}
+
+std::vector<Motion> import_cmu(const std::string& path) { return motions_of(read_cmu(path)); }
+
+std::vector<Motion> import_cmu(const std::string& path, const std::vector<std::string>& without) {
+  const h5::File file = h5::File::open(path);
+  std::vector<std::string> names = clip_names(file);
+  for (const std::string& text : without) {
+    const size_t left_out = std::erase_if(names, [&](const std::string& name) {
+      return need_text(file, "/clips/" + name, "source").find(text) != std::string::npos;
+    });
+    if (left_out == 0)
+      throw InputError(path, "no clip's source has '" + text.substr(0, 40) + "' in it",
+                       "name one of the attribute 'source' of its clips");
+  }
+  if (names.empty()) throw InputError(path, "all clips are left out", "leave out fewer sources");
+  return motions_of(read_clips(file, names, false));
+}
+
+bool is_packed_clips(const std::string& path) {
+  const h5::File file = h5::File::open(path);
+  return file.has("/clips") && file.has("/skeletons");
 }
 
 }  // namespace restage

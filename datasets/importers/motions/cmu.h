@@ -1,4 +1,5 @@
-// The CMU clips of a data folder (cmu/clips30.h5) as motions.
+// CMU clips as they are packed in a data folder (cmu/clips30.h5, cmu_more/clips30_more.h5) as
+// motions.
 #pragma once
 
 #include <string>
@@ -23,5 +24,11 @@ struct CmuClip {
 /// InputError: missing, damaged or of another layout.
 std::vector<CmuClip> read_cmu(const std::string& file, bool with_joints = false);
 std::vector<Motion> import_cmu(const std::string& file);
+/// The clips whose attribute `source`, which says whose copy of the recordings a clip was made
+/// from, holds none of the texts `without`. InputError for a text that no clip's source holds.
+std::vector<Motion> import_cmu(const std::string& file, const std::vector<std::string>& without);
+
+/// Whether a file holds clips in this layout.
+bool is_packed_clips(const std::string& file);
 
 }  // namespace restage
