@@ -71,9 +71,12 @@ class Builder {
         model_(data + "/body"),
         rows_(read_recipes(data + "/body/bodies.csv")),
         info_(data_folder_info(true, true)) {
-    for (Motion& motion : import_cmu(data + "/cmu/clips30.h5")) {
-      const std::string id = motion.id;
-      clips_.emplace(id, std::move(motion));
+    add_clips(import_cmu(data + "/cmu/clips30.h5"), "cmu/clips30.h5");
+    train_ = r_.train;
+    for (const MoreClipsRecipe& more : r_.more) {
+      std::vector<Motion> motions = import_cmu(data + "/" + more.file, more.without_sources);
+      for (const Motion& motion : motions) train_.clips.push_back(motion.id);
+      add_clips(std::move(motions), more.file);
     }
     average_ = make_character({"average", "", {}, "", 0}, model_, rows_, key_);
     touching_ = outermost_vertices(average_);
@@ -85,7 +88,7 @@ class Builder {
   }
 
   void build(const std::string& folder) {
-    write_split("train", r_.train, folder);
+    write_split("train", train_, folder);
     write_split("validation", r_.validation, folder);
     write_split("test", r_.test, folder);
     write_pairs("naked", r_.naked, folder);
@@ -96,6 +99,15 @@ class Builder {
   const FileInfo& info() const { return info_; }
 
  private:
+  void add_clips(std::vector<Motion> motions, const std::string& file) {
+    for (Motion& motion : motions) {
+      const std::string id = motion.id;
+      if (!clips_.emplace(id, std::move(motion)).second)
+        throw InputError(where_, "clip '" + id.substr(0, 40) + "' of " + file + " is there already",
+                         "leave out one of the two files");
+    }
+  }
+
   const BodyRecipe& row(const std::string& id) const {
     const auto at =
         std::find_if(rows_.begin(), rows_.end(), [&](const BodyRecipe& r) { return r.id == id; });
@@ -125,7 +137,7 @@ class Builder {
                          "keep a subject in one split");
     };
     for (const auto& [split, lists] :
-         {std::pair{"train", &r_.train}, std::pair{"validation", &r_.validation},
+         {std::pair{"train", &train_}, std::pair{"validation", &r_.validation},
           std::pair{"test", &r_.test}}) {
       for (const std::string& id : lists->bodies) row(id);
       for (const std::string& id : lists->clips) subject(id, split);
@@ -248,6 +260,7 @@ class Builder {
   std::vector<BodyRecipe> rows_;
   FileInfo info_;
   std::map<std::string, Motion> clips_;
+  SplitRecipe train_;  ///< with all clips of BenchmarkRecipe::more
   Body average_;
   std::vector<int32_t> touching_;
   Corpus cast_;
@@ -256,6 +269,7 @@ class Builder {
 /// Files of the data folder that the benchmark is made from.
 std::set<std::string> inputs_of(const BenchmarkRecipe& recipe) {
   std::set<std::string> out = {"body/makehuman.h5", "body/bodies.csv", "cmu/clips30.h5"};
+  for (const MoreClipsRecipe& more : recipe.more) out.insert(more.file);
   for (const CharacterRecipe& c : recipe.characters)
     if (!c.garment.empty())
       for (const char* ending : {".obj.gz", ".mhclo.gz"})

@@ -15,6 +15,12 @@ struct SplitRecipe {
   std::vector<std::string> bodies, clips;
 };
 
+/// Packed clips of CMU besides cmu/clips30.h5; all of them are for training.
+struct MoreClipsRecipe {
+  std::string file;                          ///< below the data folder
+  std::vector<std::string> without_sources;  ///< as import_cmu() leaves them out
+};
+
 /// Macro sliders of a MakeHuman body, 0 to 1; in the middle is the average adult.
 struct ShapeRecipe {
   double gender = 0.5, age = 0.5, muscle = 0.5, weight = 0.5, height = 0.5, proportions = 0.5;
@@ -68,6 +74,7 @@ struct BenchmarkRecipe {
                             ///< are left as the clips have them
   bool rotations = false;   ///< truths hold world rotations; protocol 1 of the open benchmark: no
   SplitRecipe train, validation, test;
+  std::vector<MoreClipsRecipe> more;
   std::vector<CharacterRecipe> characters;
   std::vector<MotionRecipe> motions;
   std::vector<PairRecipe> naked, clothed;

@@ -312,6 +312,24 @@ TEST_F(BenchmarkBuild, SameBytesForAnyNumberOfThreadsAndVerified) {
             manifest.files.at("scans/walking-dressed-skinny-depth/source.h5").sha256);
 }
 
+TEST_F(BenchmarkBuild, MoreClipsAreForTrainingAlone) {
+  const Manifest plain = read_manifest(build("plain", 2));
+  BenchmarkRecipe recipe = small_recipe();
+  recipe.more = {{"cmu_more/clips30_more.h5", {"wangzexi"}}};
+  const std::string out = build("more", 2, recipe);
+  EXPECT_TRUE(verify_benchmark(out).empty());
+  EXPECT_EQ(read_motions(out + "/train.h5", "train").size(), 1u + 307u - 23u);
+  const Manifest manifest = read_manifest(out);
+  EXPECT_EQ(manifest.inputs.count("cmu_more/clips30_more.h5"), 1u);
+  EXPECT_EQ(manifest.files.size(), plain.files.size());
+  for (const auto& [name, file] : plain.files) {
+    if (name == "train.h5" || name == "recipe.yaml") continue;
+    EXPECT_EQ(manifest.files.at(name).sha256, file.sha256) << name;
+  }
+  recipe.more = {{"cmu/clips30.h5", {}}};
+  EXPECT_THROW(build("again", 2, recipe), InputError) << "the same clips twice";
+}
+
 TEST_F(BenchmarkBuild, HoldsWhatTheRecipeSays) {
   const std::string out = build("out", 2);
   EXPECT_EQ(read_bodies(out + "/train.h5", "train").size(), 2u);

@@ -258,6 +258,24 @@ TEST_F(ImportersCmu, AllClipsGiveTheReferenceJoints) {
   EXPECT_EQ(splits["test"], 50);
 }
 
+TEST_F(ImportersCmu, SourcesOfCopiesAreLeftOut) {
+  const std::string file = data_folder() + "/cmu/clips30.h5";
+  const std::string source = *clips_file().text("/clips/01_01", "source");
+  size_t of_it = 0;
+  for (const CmuClip& clip : all_clips())
+    of_it += clips_file().text("/clips/" + clip.motion.id, "source") == source;
+  const std::vector<Motion> left = import_cmu(file, {source});
+  EXPECT_EQ(left.size(), all_clips().size() - of_it);
+  EXPECT_GT(of_it, 0u);
+  EXPECT_LT(left.size(), all_clips().size());
+  EXPECT_THROW(import_cmu(file, {"nobody/nothing"}), InputError);
+  EXPECT_TRUE(is_packed_clips(file));
+  TemporaryFolder dir;
+  const ImportSummary whole = import_data(file, dir / "all.h5");
+  EXPECT_EQ(whole.motions, 247u);
+  EXPECT_EQ(whole.bodies, 0u);
+}
+
 TEST_F(ImportersCmu, RestAndFloorAreThoseOfTheFile) {
   for (const CmuClip& clip : all_clips()) {
     const std::string group = "/clips/" + clip.motion.id;

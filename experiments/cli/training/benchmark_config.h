@@ -13,6 +13,13 @@ void visit(V& v, SplitRecipe& c) {
 }
 
 template <class V>
+void visit(V& v, MoreClipsRecipe& c) {
+  v("file", c.file, "packed clips of CMU, below the data folder", required());
+  v("without_sources", c.without_sources,
+    "leave out clips whose attribute 'source' has one of these in it");
+}
+
+template <class V>
 void visit(V& v, ShapeRecipe& c) {
   v("gender", c.gender, "0 female to 1 male", between(0, 1));
   v("age", c.age, "0.19 a child, 0.5 an adult, 1 old", between(0, 1));
@@ -92,6 +99,7 @@ void visit(V& v, BenchmarkRecipe& c) {
   v("train", c.train, "train.h5");
   v("validation", c.validation, "validation.h5");
   v("test", c.test, "test.h5");
+  v("more", c.more, "further clips, all for train.h5", added("[]"));
   v("characters", c.characters, "people of the sets below");
   v("motions", c.motions, "motions of the sets below");
   v("naked", c.naked, "pairs of naked/");
