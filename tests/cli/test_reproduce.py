@@ -104,6 +104,8 @@ class Reproduce(CliTest):
         self.assertEqual(self.text("page/somebody2024/one.md"), table)
         head = lambda text: text[:text.index("Made by")]
         self.assertEqual(head(self.text("page/somebody2024.md")), head(page))
+        self.reproduce("--budget", "lite", "--out", os.path.abspath(self.path("page/far")), "--page", "page", "--no-run")
+        self.assertIn("--out runs/far ", self.text("page/somebody2024.md"))
 
     @needs_data("body/makehuman.h5")
     def test_pictures(self):
@@ -228,6 +230,7 @@ class OurFolders(CliTest):
         for words, *contains in ((["--printed", "--plan"], "two questions"), (["--printed", "--budget", "lite"], "--budget has no effect beside --printed"),
                                  (["--plan"], "--budget is missing"), (["--budget", "lite"], "--out is missing"),
                                  (["--plan", "--budget", "lite", "--out", "r"], "--out has no effect beside --plan"),
+                                 (["--printed", "--jobs", "2"], "--jobs has no effect"), (["--printed", "--seed", "3"], "--seed has no effect"),
                                  (["--printed", "seeds=1"], "WORDS has no effect")):
             self.bad_input(["reproduce", "somebody2024", "--experiments", "experiments", *words], *contains)
 

@@ -29,7 +29,7 @@ struct ReproduceOptions {
   bool no_run = false, keep = false, plan = false, printed = false;
 };
 
-void check(const ReproduceOptions& o) {
+void check(const ReproduceOptions& o, const Common& common) {
   if (o.jobs < 1)
     throw InputError("", "--jobs " + std::to_string(o.jobs) + " is out of range", "give 1 or more");
   for (const std::string& word : o.words)
@@ -48,7 +48,8 @@ void check(const ReproduceOptions& o) {
        {std::pair(!o.out.empty(), "--out"), std::pair(!o.page.empty(), "--page"),
         std::pair(o.no_run, "--no-run"), std::pair(o.keep, "--keep"),
         std::pair(o.printed && !o.budget.empty(), "--budget"),
-        std::pair(o.printed && !o.words.empty(), "WORDS")})
+        std::pair(o.printed && !o.words.empty(), "WORDS"), std::pair(o.jobs != 1, "--jobs"),
+        std::pair(o.printed && common.seed_given, "--seed")})
     if (given && !runs)
       throw InputError("", cat(name, " has no effect beside ", o.plan ? "--plan" : "--printed"),
                        "leave it out");
@@ -181,7 +182,7 @@ int show_printed(const ReproduceOptions& o, const Common& common,
 }
 
 int run_reproduce(ReproduceOptions o, const Common& common) {
-  check(o);
+  check(o, common);
   if (o.page.empty()) o.page = o.out;
   o.from = here_or_shipped(o.from);
   const std::vector<Evidence> all = reproduce::find_evidence(o.from, o.paper, o.table, o.out);
@@ -193,6 +194,9 @@ int run_reproduce(ReproduceOptions o, const Common& common) {
   const bool done = o.no_run || run_trials(o, all);
   reproduce::PageOptions options{o.paper, o.budget, common.command_line};
   options.command[0] = "restage";
+  for (std::string& word : options.command)  // a page is for other machines
+    if (const std::filesystem::path path = word; path.is_absolute())
+      word = "runs/" + path.filename().string();
   const std::vector<reproduce::Found> found = reproduce::found(all, options, o.page);
   for (const auto& one : found)
     for (const std::string& notice : one.results.notices) log_warning(on_one_line(notice));
