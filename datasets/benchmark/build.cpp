@@ -74,7 +74,7 @@ class Builder {
     add_clips(import_cmu(data + "/cmu/clips30.h5"), "cmu/clips30.h5");
     train_ = r_.train;
     for (const MoreClipsRecipe& more : r_.more) {
-      std::vector<Motion> motions = import_cmu(data + "/" + more.file, more.without_sources);
+      std::vector<Motion> motions = import_cmu(data + "/" + more.file, more.without);
       for (const Motion& motion : motions) train_.clips.push_back(motion.id);
       add_clips(std::move(motions), more.file);
     }

@@ -17,8 +17,8 @@ struct SplitRecipe {
 
 /// Packed clips of CMU besides cmu/clips30.h5; all of them are for training.
 struct MoreClipsRecipe {
-  std::string file;                          ///< below the data folder
-  std::vector<std::string> without_sources;  ///< as import_cmu() leaves them out
+  std::string file;                  ///< below the data folder
+  std::vector<std::string> without;  ///< as import_cmu() leaves them out
 };
 
 /// Macro sliders of a MakeHuman body, 0 to 1; in the middle is the average adult.

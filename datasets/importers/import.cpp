@@ -53,7 +53,7 @@ ImportSummary import_packed_clips(const std::string& source, const std::string& 
   check_options({InputKind::packed_clips}, source, options);
   ImportSummary summary;
   ImportWriter writer(out, data_folder_info(false, true), summary);
-  writer.add(source, {}, import_cmu(source, options.without_sources));
+  writer.add(source, {}, import_cmu(source, options.without));
   writer.commit();
   return summary;
 }

@@ -15,9 +15,9 @@ namespace restage {
 struct ImportOptions {
   /// Of BVH and AMC files; which of them other kinds take: import_options.cpp.
   MotionOptions motion;
-  std::string asf;                           ///< skeleton of AMC files; empty: the one beside each
-  std::string clip;                          ///< of glTF files: this animation only; empty: all
-  std::vector<std::string> without_sources;  ///< of packed clips: import_cmu()
+  std::string asf;                   ///< skeleton of AMC files; empty: the one beside each
+  std::string clip;                  ///< of glTF files: this animation only; empty: all
+  std::vector<std::string> without;  ///< of packed clips: import_cmu()
   std::string garment;  ///< dress the bodies in this garment of body/clothes; empty: skin
   std::string license = "unknown";  ///< of all but a data folder, whose licence is known
   /// Regular expression (ECMAScript) whose first group in a file's path below the folder names who

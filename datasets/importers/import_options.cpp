@@ -49,7 +49,7 @@ std::vector<Given> all_of(const ImportOptions& options) {
       {"{clip}", !options.clip.empty(), {character}, "glTF characters"},
       {"{body-model}", !options.body_model.empty(), {amass}, "AMASS motions"},
       {"{betas}", !options.betas.empty(), {body_model}, "body models"},
-      {"{without-sources}", !options.without_sources.empty(), {packed_clips}, "packed clips"},
+      {"{without}", !options.without.empty(), {packed_clips}, "packed clips"},
       {"{garment}", !options.garment.empty(), {data_folder}, "data folders"},
   };
 }

@@ -9,6 +9,7 @@
 #include <map>
 
 #include "datasets/hdf5/file.h"
+#include "datasets/importers/import.h"
 #include "datasets/importers/motions/amc.h"
 #include "datasets/importers/motions/bvh.h"
 #include "datasets/importers/motions/cmu.h"
@@ -267,10 +268,11 @@ TEST_F(ImportersCmu, SourcesOfCopiesAreLeftOut) {
   const std::vector<Motion> left = import_cmu(file, {source});
   EXPECT_EQ(left.size(), all_clips().size() - of_it);
   EXPECT_GT(of_it, 0u);
+  EXPECT_EQ(import_cmu(file, {"01_01", "02_01"}).size(), all_clips().size() - 2);
   EXPECT_LT(left.size(), all_clips().size());
   EXPECT_THROW(import_cmu(file, {"nobody/nothing"}), InputError);
   EXPECT_TRUE(is_packed_clips(file));
-  TemporaryFolder dir;
+  TempDir dir;
   const ImportSummary whole = import_data(file, dir / "all.h5");
   EXPECT_EQ(whole.motions, 247u);
   EXPECT_EQ(whole.bodies, 0u);

@@ -160,7 +160,8 @@ TEST(SamplingPartial, WhoIsTiltedIsShownUpright) {
 }
 
 TEST(SamplingPartial, CamerasAtTheCeilingSeeHeadsAndNoSoles) {
-  const CloudConfig above{.points = 512, .noise = 0, .tpose_share = 0, .one_camera = 1, .ceiling = 1};
+  const CloudConfig above{
+      .points = 512, .noise = 0, .tpose_share = 0, .one_camera = 1, .ceiling = 1};
   const CloudBatch seen = batch_of(above);
   CloudConfig usual = above;
   usual.ceiling = 0;

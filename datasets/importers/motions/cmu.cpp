@@ -158,13 +158,15 @@ std::vector<Motion> import_cmu(const std::string& path, const std::vector<std::s
   std::vector<std::string> names = clip_names(file);
   for (const std::string& text : without) {
     const size_t left_out = std::erase_if(names, [&](const std::string& name) {
-      return need_text(file, "/clips/" + name, "source").find(text) != std::string::npos;
+      return name == text ||
+             need_text(file, "/clips/" + name, "source").find(text) != std::string::npos;
     });
     if (left_out == 0)
-      throw InputError(path, "no clip's source has '" + text.substr(0, 40) + "' in it",
-                       "name one of the attribute 'source' of its clips");
+      throw InputError(path,
+                       "no clip has the name '" + text.substr(0, 40) + "' or a source with it",
+                       "name a clip, or a part of its attribute 'source'");
   }
-  if (names.empty()) throw InputError(path, "all clips are left out", "leave out fewer sources");
+  if (names.empty()) throw InputError(path, "all clips are left out", "leave out fewer");
   return motions_of(read_clips(file, names, false));
 }
 

@@ -24,8 +24,9 @@ struct CmuClip {
 /// InputError: missing, damaged or of another layout.
 std::vector<CmuClip> read_cmu(const std::string& file, bool with_joints = false);
 std::vector<Motion> import_cmu(const std::string& file);
-/// The clips whose attribute `source`, which says whose copy of the recordings a clip was made
-/// from, holds none of the texts `without`. InputError for a text that no clip's source holds.
+/// The clips that are not named in `without`, and whose attribute `source`, which says whose copy
+/// of the recordings a clip was made from, holds none of these texts. InputError for a text that is
+/// no clip's name and in no clip's source.
 std::vector<Motion> import_cmu(const std::string& file, const std::vector<std::string>& without);
 
 /// Whether a file holds clips in this layout.

@@ -99,7 +99,7 @@ void add_data_import(Program& program, CommandOptions group) {
                   "restage data import --source a.bvh --bones mixamo --up z --facing x --split "
                   "test --out a.h5\n"
                   "restage data import a.bvh --rest-frame 0 --drop-leading 1 --force --out a.h5\n"
-                  "restage data import cmu_more/clips30_more.h5 --without-sources ShovelHand --out "
+                  "restage data import cmu_more/clips30_more.h5 --without ShovelHand --out "
                   "more.h5\n"
                   "restage data import hero.glb --clip Walk --out walk.h5\n"
                   "restage data import DATA_FOLDER --garment male_casualsuit04 --out dressed.h5",
@@ -149,8 +149,9 @@ void add_data_import(Program& program, CommandOptions group) {
                  "SMPL, SMPL-H or SMPL-X model (.npz), or a folder of them: AMASS needs it");
   app.add_option("--betas", options.betas,
                  "people of a body model: NPZ or NPY files, or zeros for the mean person");
-  app.add_option("--without-sources", options.without_sources,
-                 "packed clips: leave out those whose attribute 'source' has one of these in it");
+  app.add_option("--without", options.without,
+                 "packed clips: leave out those of this name, or whose attribute 'source' has this "
+                 "in it");
   app.add_option("--garment", options.garment,
                  "data folder: dress the bodies (a file of body/clothes) (default: naked)");
 }

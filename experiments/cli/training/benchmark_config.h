@@ -15,8 +15,7 @@ void visit(V& v, SplitRecipe& c) {
 template <class V>
 void visit(V& v, MoreClipsRecipe& c) {
   v("file", c.file, "packed clips of CMU, below the data folder", required());
-  v("without_sources", c.without_sources,
-    "leave out clips whose attribute 'source' has one of these in it");
+  v("without", c.without, "clips to leave out, by name or by a part of their attribute 'source'");
 }
 
 template <class V>
