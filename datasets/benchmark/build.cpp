@@ -18,6 +18,7 @@
 #include "datasets/importers/import.h"
 #include "datasets/importers/motions/cmu.h"
 #include "datasets/readers/errors.h"
+#include "datasets/sampling/thin_mesh.h"
 
 namespace restage {
 namespace {
@@ -79,10 +80,11 @@ class Builder {
       add_clips(std::move(motions), more.file);
     }
     average_ = make_character({"average", "", {}, "", 0}, model_, rows_, key_);
+    thin_ = thin_mesh(average_.rest, static_cast<size_t>(r_.vertices));
     touching_ = outermost_vertices(average_);
     check_names();
     for (const CharacterRecipe& c : r_.characters)
-      cast_.bodies.push_back(make_character(c, model_, rows_, key_));
+      cast_.bodies.push_back(thinned(make_character(c, model_, rows_, key_)));
     for (const MotionRecipe& m : r_.motions) cast_.motions.push_back(test_clip(m.clip));
     check_views();
   }
@@ -107,6 +109,8 @@ class Builder {
                          "leave out one of the two files");
     }
   }
+
+  Body thinned(Body body) const { return r_.vertices > 0 ? thin_body(body, thin_) : body; }
 
   const BodyRecipe& row(const std::string& id) const {
     const auto at =
@@ -172,7 +176,7 @@ class Builder {
     in_batches<Body>(
         lists.bodies.size(),
         [&](size_t i) {
-          Body body = model_.build(row(lists.bodies[i]));
+          Body body = thinned(model_.build(row(lists.bodies[i])));
           body.split = split;
           return body;
         },
@@ -262,6 +266,7 @@ class Builder {
   std::map<std::string, Motion> clips_;
   SplitRecipe train_;  ///< with all clips of BenchmarkRecipe::more
   Body average_;
+  ThinMesh thin_;  ///< of every body, where the recipe says so
   std::vector<int32_t> touching_;
   Corpus cast_;
 };

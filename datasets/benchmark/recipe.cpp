@@ -15,6 +15,8 @@ constexpr std::array<std::pair<const char*, SplitRecipe BenchmarkRecipe::*>, 3> 
      {"validation", &BenchmarkRecipe::validation},
      {"test", &BenchmarkRecipe::test}}};
 
+constexpr int64_t kLeastVertices = 200;
+
 class Checker {
  public:
   Checker(const BenchmarkRecipe& recipe, const std::string& where) : r_(recipe), where_(where) {}
@@ -29,7 +31,13 @@ class Checker {
       held_out("body", c.body, &SplitRecipe::bodies);
       if (!c.body.empty() && c.shape != ShapeRecipe{})
         fail("the character '" + c.id + "' has both a body and a shape", "keep one of the two");
+      if (r_.vertices > 0 && !c.garment.empty())
+        fail("the character '" + c.id + "' wears a garment, which has vertices of its own",
+             "leave out the garment, or 'vertices'");
     }
+    if (r_.vertices > 0 && r_.vertices < kLeastVertices)
+      fail("bodies of " + std::to_string(r_.vertices) + " vertices have no hands or feet",
+           "keep " + std::to_string(kLeastVertices) + " or more");
     for (const MotionRecipe& m : r_.motions) held_out("clip", m.clip, &SplitRecipe::clips);
     for (const auto* pairs : {&r_.naked, &r_.clothed})
       for (const PairRecipe& p : *pairs) {

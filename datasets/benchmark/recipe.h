@@ -73,6 +73,7 @@ struct BenchmarkRecipe {
   double floor_window = 1;  ///< seconds within which a foot is taken to touch the floor; 0: floors
                             ///< are left as the clips have them
   bool rotations = false;   ///< truths hold world rotations; protocol 1 of the open benchmark: no
+  int64_t vertices = 0;     ///< of every body, the same ones; 0: all. Without garments
   SplitRecipe train, validation, test;
   std::vector<MoreClipsRecipe> more;
   std::vector<CharacterRecipe> characters;

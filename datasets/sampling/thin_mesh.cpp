@@ -68,4 +68,16 @@ ThinMesh thin_mesh(const Mesh& mesh, size_t vertices) {
   return out;
 }
 
+Body thin_body(const Body& body, const ThinMesh& thin) {
+  Body out = body;
+  out.rest.faces = thin.faces;
+  out.rest.vertices.clear();
+  out.weights.resize(std::ssize(thin.kept), kJoints);
+  for (const int32_t v : thin.kept) {
+    out.weights.row(std::ssize(out.rest.vertices)) = body.weights.row(v);
+    out.rest.vertices.push_back(body.rest.vertices[static_cast<size_t>(v)]);
+  }
+  return out;
+}
+
 }  // namespace restage

@@ -16,5 +16,7 @@ struct ThinMesh {
 /// regions of vertices that are nearer to one of them than to the others, along edges, meet in a
 /// face (the dual of the Voronoi cells). 0, or not fewer than there are: the whole mesh.
 ThinMesh thin_mesh(const Mesh& mesh, size_t vertices);
+/// The body of these vertices. Needs a body without blend shapes.
+Body thin_body(const Body& body, const ThinMesh& thin);
 
 }  // namespace restage

@@ -2,6 +2,7 @@
 // small from the data folder.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <functional>
@@ -64,6 +65,8 @@ TEST(BenchmarkRecipe, IsCheckedAsAWhole) {
       {[](auto& r) { r.characters[0].id = "../x"; }, "cannot be the id of a character"},
       {[](auto& r) { r.motions[0].id = "a-b"; }, "cannot be the id of a motion"},
       {[](auto& r) { r.characters[1].id = r.characters[0].id; }, "is there twice"},
+      {[](auto& r) { r.vertices = 500; }, "wears a garment"},
+      {[](auto& r) { r.characters.clear(), r.vertices = 10; }, "10 vertices"},
       {[](auto& r) { r.naked[0].target = "nobody"; }, "no character 'nobody'"},
       {[](auto& r) { r.naked[0].motions = {"flying"}; }, "no motion 'flying'"},
       {[](auto& r) { r.scans[0].scanner = "x"; }, "no scanner 'x'"},
@@ -328,6 +331,33 @@ TEST_F(BenchmarkBuild, MoreClipsAreForTrainingAlone) {
   }
   recipe.more = {{"cmu/clips30.h5", {}}};
   EXPECT_THROW(build("again", 2, recipe), InputError) << "the same clips twice";
+}
+
+TEST_F(BenchmarkBuild, ASmallWorldKeepsTheSameVerticesOfAllBodies) {
+  BenchmarkRecipe recipe = small_recipe();
+  std::erase_if(recipe.characters, [](const auto& c) { return !c.garment.empty(); });
+  recipe.naked = {{"skinny", "skinny", {"walking"}}};
+  recipe.clothed.clear();
+  recipe.scans.clear();
+  recipe.vertices = 500;
+  const std::string out = build("small", 2, recipe);
+  EXPECT_TRUE(verify_benchmark(out).empty());
+  const std::vector<Body> people = read_bodies(out + "/train.h5", "train");
+  ASSERT_EQ(people.size(), 2u);
+  for (const Body& body : people) {
+    EXPECT_EQ(body.rest.vertices.size(), 500u);
+    EXPECT_EQ(body.weights.rows(), 500);
+    EXPECT_EQ(body.rest.faces, people[0].rest.faces) << "one topology";
+    EXPECT_GT(body.rest.faces.size(), 900u);
+  }
+  const MakeHuman model(test::data_folder() + "/body");
+  const std::vector<BodyRecipe> rows = read_recipes(test::data_folder() + "/body/bodies.csv");
+  const Body whole = model.build(rows[0]);
+  ASSERT_EQ(whole.id, people[0].id);
+  EXPECT_EQ(whole.joints, people[0].joints);
+  for (const Point& p : people[0].rest.vertices)
+    EXPECT_NE(std::find(whole.rest.vertices.begin(), whole.rest.vertices.end(), p),
+              whole.rest.vertices.end());
 }
 
 TEST_F(BenchmarkBuild, HoldsWhatTheRecipeSays) {

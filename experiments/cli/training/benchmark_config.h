@@ -95,6 +95,8 @@ void visit(V& v, BenchmarkRecipe& c) {
   v("rotations", c.rotations, "truths hold world rotations", added("false"));
   v("floor_window", c.floor_window, "seconds within which a foot touches the floor; 0: as recorded",
     between(0, 10));
+  v("vertices", c.vertices, "that all bodies keep, the same ones; 0: all",
+    added("0", between(0, 1e6)));
   v("train", c.train, "train.h5");
   v("validation", c.validation, "validation.h5");
   v("test", c.test, "test.h5");
