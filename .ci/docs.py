@@ -8,8 +8,9 @@ import sys
 
 ROOT = pathlib.Path(__file__).resolve().parents[1]
 DECISIONS = ROOT / "docs/decisions.md"
-# Of README.md and docs without that page and what is generated below docs/reproduction; of that page.
-MOST_WORDS, MOST_DECISIONS = 25_000, 4_000
+REFERENCE = ROOT / "docs/config_reference.md"  # a test asks for each of its rows
+# Of README.md and docs without these two pages and what is generated below docs/reproduction; of the first of them.
+MOST_WORDS, MOST_DECISIONS = 22_000, 4_000
 faults = []
 
 
@@ -66,7 +67,7 @@ def words(*paths):
 
 
 generated = [p for p in pages() if p.is_relative_to(ROOT / "docs/reproduction")]
-read = [p for p in pages() if p.is_relative_to(ROOT / "docs") and p != DECISIONS and p not in generated] + [ROOT / "README.md"]
+read = [p for p in pages() if p.is_relative_to(ROOT / "docs") and p not in (DECISIONS, REFERENCE, *generated)] + [ROOT / "README.md"]
 print("%d pages to read, %d words; decisions, %d words" % (len(read), words(*read), words(DECISIONS)))
 if words(*read) > MOST_WORDS:
     faults.append("docs: %d words, and %d are enough; a reason belongs into docs/decisions.md" % (words(*read), MOST_WORDS))
