@@ -76,7 +76,8 @@ class Builder {
     train_ = r_.train;
     for (const MoreClipsRecipe& more : r_.more) {
       std::vector<Motion> motions = import_cmu(data + "/" + more.file, more.without);
-      for (const Motion& motion : motions) train_.clips.push_back(motion.id);
+      for (const Motion& motion : motions)
+        if (more.train) train_.clips.push_back(motion.id);
       add_clips(std::move(motions), more.file);
     }
     average_ = make_character({"average", "", {}, "", 0}, model_, rows_, key_);

@@ -15,9 +15,10 @@ struct SplitRecipe {
   std::vector<std::string> bodies, clips;
 };
 
-/// Packed clips of CMU besides cmu/clips30.h5; all of them are for training.
+/// Packed clips of CMU besides cmu/clips30.h5.
 struct MoreClipsRecipe {
   std::string file;                  ///< below the data folder
+  bool train = true;                 ///< all of them are for training; else only to be named
   std::vector<std::string> without;  ///< as import_cmu() leaves them out
 };
 

@@ -318,7 +318,7 @@ TEST_F(BenchmarkBuild, SameBytesForAnyNumberOfThreadsAndVerified) {
 TEST_F(BenchmarkBuild, MoreClipsAreForTrainingAlone) {
   const Manifest plain = read_manifest(build("plain", 2));
   BenchmarkRecipe recipe = small_recipe();
-  recipe.more = {{"cmu_more/clips30_more.h5", {"wangzexi"}}};
+  recipe.more = {{"cmu_more/clips30_more.h5", true, {"wangzexi"}}};
   const std::string out = build("more", 2, recipe);
   EXPECT_TRUE(verify_benchmark(out).empty());
   EXPECT_EQ(read_motions(out + "/train.h5", "train").size(), 1u + 307u - 23u);
@@ -329,7 +329,13 @@ TEST_F(BenchmarkBuild, MoreClipsAreForTrainingAlone) {
     if (name == "train.h5" || name == "recipe.yaml") continue;
     EXPECT_EQ(manifest.files.at(name).sha256, file.sha256) << name;
   }
-  recipe.more = {{"cmu/clips30.h5", {}}};
+  recipe.more = {{"cmu_more/clips30_more.h5", false, {}}};
+  recipe.motions.push_back({"roll", "127_23", 0, 20});
+  recipe.naked = {{"dressed", "skinny", {"roll"}}};
+  const std::string named = build("named", 2, recipe);
+  EXPECT_EQ(read_motions(named + "/train.h5", "train").size(), 1u);
+  EXPECT_EQ(read_prediction(named + "/naked/roll-dressed-skinny/truth.h5").frames, 20);
+  recipe.more = {{"cmu/clips30.h5", true, {}}};
   EXPECT_THROW(build("again", 2, recipe), InputError) << "the same clips twice";
 }
 

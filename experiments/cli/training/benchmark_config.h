@@ -15,6 +15,7 @@ void visit(V& v, SplitRecipe& c) {
 template <class V>
 void visit(V& v, MoreClipsRecipe& c) {
   v("file", c.file, "packed clips of CMU, below the data folder", required());
+  v("train", c.train, "all of them are for training; else only to be named");
   v("without", c.without, "clips to leave out, by name or by a part of their attribute 'source'");
 }
 
@@ -100,7 +101,7 @@ void visit(V& v, BenchmarkRecipe& c) {
   v("train", c.train, "train.h5");
   v("validation", c.validation, "validation.h5");
   v("test", c.test, "test.h5");
-  v("more", c.more, "further clips, all for train.h5", added("[]"));
+  v("more", c.more, "further clips", added("[]"));
   v("characters", c.characters, "people of the sets below");
   v("motions", c.motions, "motions of the sets below");
   v("naked", c.naked, "pairs of naked/");
