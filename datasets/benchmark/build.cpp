@@ -72,15 +72,12 @@ class Builder {
         model_(data + "/body"),
         rows_(read_recipes(data + "/body/bodies.csv")),
         info_(data_folder_info(true, true)) {
-    add_clips(import_cmu(data + "/cmu/clips30.h5"), "cmu/clips30.h5");
-    train_ = r_.train;
-    for (const MoreClipsRecipe& more : r_.more) {
-      std::vector<Motion> motions = import_cmu(data + "/" + more.file, more.without);
-      for (const Motion& motion : motions)
-        if (more.train) train_.clips.push_back(motion.id);
-      add_clips(std::move(motions), more.file);
-    }
+    read_clips(data);
     average_ = make_character({"average", "", {}, "", 0}, model_, rows_, key_);
+    const auto vertices = std::ssize(average_.rest.vertices);
+    if (r_.vertices >= vertices)
+      throw InputError(where_, cat("bodies have ", vertices, " vertices, so 'vertices' takes none"),
+                       "give fewer, or 0");
     thin_ = thin_mesh(average_.rest, static_cast<size_t>(r_.vertices));
     touching_ = outermost_vertices(average_);
     check_names();
@@ -102,12 +99,35 @@ class Builder {
   const FileInfo& info() const { return info_; }
 
  private:
+  void read_clips(const std::string& data) {
+    add_clips(import_cmu(data + "/cmu/clips30.h5"), "cmu/clips30.h5");
+    train_ = r_.train;
+    for (const MoreClipsRecipe& more : r_.more) {
+      std::error_code ignored;
+      if (!fs::exists(data + "/" + more.file, ignored))
+        throw InputError(where_, "more names " + more.file + ", which is not in " + data,
+                         "put it there, or leave it out");
+      std::vector<Motion> motions = import_cmu(data + "/" + more.file, more.without);
+      for (const Motion& motion : motions) {
+        if (!more.train) continue;
+        const auto& named = train_.clips;
+        if (std::find(named.begin(), named.end(), motion.id) != named.end())
+          throw InputError(where_,
+                           "clip '" + motion.id + "' is in train.clips, and all clips of " +
+                               more.file + " are for training",
+                           "list it once, or write 'train: false' beside the file");
+        train_.clips.push_back(motion.id);
+      }
+      add_clips(std::move(motions), more.file);
+    }
+  }
+
   void add_clips(std::vector<Motion> motions, const std::string& file) {
     for (Motion& motion : motions) {
       const std::string id = motion.id;
       if (!clips_.emplace(id, std::move(motion)).second)
         throw InputError(where_, "clip '" + id.substr(0, 40) + "' of " + file + " is there already",
-                         "leave out one of the two files");
+                         "leave one of the two out, by 'without'");
     }
   }
 
@@ -125,7 +145,7 @@ class Builder {
   const Motion& clip(const std::string& id) const {
     const auto at = clips_.find(id);
     if (at == clips_.end())
-      throw InputError(where_, "clips30.h5 has no clip '" + id.substr(0, 40) + "'",
+      throw InputError(where_, "there is no clip '" + id.substr(0, 40) + "'",
                        "name one such as '" + clips_.begin()->first + "'");
     return at->second;
   }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <filesystem>
 #include <map>
 #include <set>
 
@@ -38,6 +39,7 @@ class Checker {
     if (r_.vertices > 0 && r_.vertices < kLeastVertices)
       fail("bodies of " + std::to_string(r_.vertices) + " vertices have no hands or feet",
            "keep " + std::to_string(kLeastVertices) + " or more");
+    for (size_t i = 0; i < r_.more.size(); ++i) below_the_folder(i);
     for (const MotionRecipe& m : r_.motions) held_out("clip", m.clip, &SplitRecipe::clips);
     for (const auto* pairs : {&r_.naked, &r_.clothed})
       for (const PairRecipe& p : *pairs) {
@@ -56,6 +58,24 @@ class Checker {
   }
 
  private:
+  /// The manifest names what a benchmark was made from, and each file once.
+  void below_the_folder(size_t i) const {
+    namespace fs = std::filesystem;
+    const fs::path path = r_.more[i].file;
+    const std::string key = "more." + std::to_string(i) + ".file '" + path.string().substr(0, 60);
+    if (path.empty() || path.is_absolute() || path != path.lexically_normal() ||
+        *path.begin() == "..")
+      fail(key + "' is no plain path below the data folder",
+           "write it as in cmu_more/clips30_more.h5");
+    for (size_t k = 0; k < i; ++k)
+      if (r_.more[k].file == r_.more[i].file) fail(key + "' is there twice", "list it once");
+    if (path == "cmu/clips30.h5") fail(key + "' is read anyway", "leave it out");
+    for (const std::string& word : r_.more[i].without)
+      if (word.empty())
+        fail("more." + std::to_string(i) + ".without holds an empty text",
+             "name a clip or a source");
+  }
+
   [[noreturn]] void fail(const std::string& what, const std::string& fix) const {
     throw InputError(where_, what, fix);
   }

@@ -6,6 +6,7 @@
 #include <set>
 
 #include "autograd/base/output_check.h"
+#include "autograd/base/words.h"
 #include "datasets/importers/batches.h"
 #include "datasets/importers/bodies/makehuman.h"
 #include "datasets/importers/import_detail.h"
@@ -53,7 +54,12 @@ ImportSummary import_packed_clips(const std::string& source, const std::string& 
   check_options({InputKind::packed_clips}, source, options);
   ImportSummary summary;
   ImportWriter writer(out, data_folder_info(false, true), summary);
-  writer.add(source, {}, import_cmu(source, options.without));
+  std::vector<size_t> left_out;
+  writer.add(source, {}, import_cmu(source, options.without, &left_out));
+  ImportReport report{source, {}, {}};
+  for (size_t i = 0; i < left_out.size(); ++i)
+    report.fact("left out", cat(options.without[i], ": ", counted(left_out[i], "clip")));
+  if (!left_out.empty()) summary.reports.push_back(std::move(report));
   writer.commit();
   return summary;
 }

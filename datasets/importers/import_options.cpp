@@ -35,9 +35,10 @@ std::vector<Given> all_of(const ImportOptions& options) {
   const RestOptions& rest = motion.rest;
   return {
       {"{license}", options.license != none.license, files, "files whose licence is not known"},
-      {"{subject}", !motion.subject.empty(), motions, "motions"},
+      {"{subject}", !motion.subject.empty(), motions, "recordings, characters and AMASS motions"},
       {"{subjects}", !options.subjects.empty(), motions, "motions"},
-      {"{split}", motion.split != none.motion.split, bodies, "motions and bodies"},
+      {"{split}", motion.split != none.motion.split, bodies,
+       "recordings, characters, AMASS motions and body models"},
       {"{scale}", motion.scale > 0, scaled, of_scaled},
       {"{fps}", motion.fps > 0, timed, of_timed},
       {"{up}", rest.up != Axis::automatic, turned, of_turned},

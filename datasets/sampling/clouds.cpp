@@ -43,8 +43,10 @@ CloudConfig checked(const CloudConfig& c) {
   for (const double share : {c.ceiling, c.cropped, c.sparse, c.noisy, c.tilted, c.upright})
     check_setting("cloud", share >= 0 && share <= 1,
                   "ceiling, cropped, sparse, noisy, tilted, upright", "0 to 1");
-  check_setting("cloud", c.most_noise >= c.noise && std::isfinite(c.most_noise), "most_noise",
-                "metres, at least noise");
+  check_setting("cloud", c.noisy == 0 || (c.most_noise >= c.noise && c.most_noise <= 1),
+                "most_noise", "metres, at least noise and at most 1");
+  check_setting("cloud", c.ceiling == 0 || c.one_camera + c.camera_ring > 0, "ceiling",
+                "0 where no camera sees a cloud, or give one_camera or camera_ring");
   check_setting("cloud", c.min_fraction > 0 && c.min_fraction <= 1, "min_fraction", "above 0 to 1");
   return c;
 }

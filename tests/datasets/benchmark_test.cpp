@@ -65,6 +65,34 @@ TEST(BenchmarkRecipe, IsCheckedAsAWhole) {
       {[](auto& r) { r.characters[0].id = "../x"; }, "cannot be the id of a character"},
       {[](auto& r) { r.motions[0].id = "a-b"; }, "cannot be the id of a motion"},
       {[](auto& r) { r.characters[1].id = r.characters[0].id; }, "is there twice"},
+      {[](auto& r) {
+         r.more = {{"../x.h5", true, {}}};
+       },
+       "no plain path"},
+      {[](auto& r) {
+         r.more = {{"./x.h5", true, {}}};
+       },
+       "no plain path"},
+      {[](auto& r) {
+         r.more = {{"/x.h5", true, {}}};
+       },
+       "no plain path"},
+      {[](auto& r) {
+         r.more = {{"", true, {}}};
+       },
+       "no plain path"},
+      {[](auto& r) {
+         r.more = {{"x.h5", true, {}}, {"x.h5", true, {}}};
+       },
+       "is there twice"},
+      {[](auto& r) {
+         r.more = {{"cmu/clips30.h5", true, {}}};
+       },
+       "is read anyway"},
+      {[](auto& r) {
+         r.more = {{"x.h5", true, {""}}};
+       },
+       "an empty text"},
       {[](auto& r) { r.vertices = 500; }, "wears a garment"},
       {[](auto& r) { r.characters.clear(), r.vertices = 10; }, "10 vertices"},
       {[](auto& r) { r.naked[0].target = "nobody"; }, "no character 'nobody'"},
@@ -335,8 +363,19 @@ TEST_F(BenchmarkBuild, MoreClipsAreForTrainingAlone) {
   const std::string named = build("named", 2, recipe);
   EXPECT_EQ(read_motions(named + "/train.h5", "train").size(), 1u);
   EXPECT_EQ(read_prediction(named + "/naked/roll-dressed-skinny/truth.h5").frames, 20);
-  recipe.more = {{"cmu/clips30.h5", true, {}}};
-  EXPECT_THROW(build("again", 2, recipe), InputError) << "the same clips twice";
+  recipe.more = {{"cmu_more/clips30_more.h5", true, {}}};
+  expect_refused([&] { build("again", 2, recipe); }, "r.yaml: ", "'127_23' is of subject 127");
+  recipe = small_recipe();
+  recipe.train.clips.push_back("85_05");
+  recipe.more = {{"cmu_more/clips30_more.h5", true, {}}};
+  expect_refused([&] { build("again", 2, recipe); }, "r.yaml: ", "'85_05' is in train.clips");
+  recipe.more = {{"cmu_more/none.h5", true, {}}};
+  expect_refused([&] { build("again", 2, recipe); }, "r.yaml: ", "cmu_more/none.h5, which is not");
+  recipe = small_recipe();
+  recipe.characters[1].garment = "";
+  recipe.vertices = 99999;
+  expect_refused([&] { build("again", 2, recipe); }, "r.yaml: ", "takes none");
+  EXPECT_FALSE(fs::exists(dir / "again"));
 }
 
 TEST_F(BenchmarkBuild, ASmallWorldKeepsTheSameVerticesOfAllBodies) {

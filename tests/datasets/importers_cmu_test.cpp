@@ -269,6 +269,11 @@ TEST_F(ImportersCmu, SourcesOfCopiesAreLeftOut) {
   EXPECT_EQ(left.size(), all_clips().size() - of_it);
   EXPECT_GT(of_it, 0u);
   EXPECT_EQ(import_cmu(file, {"01_01", "02_01"}).size(), all_clips().size() - 2);
+  std::vector<size_t> counts;
+  EXPECT_EQ(import_cmu(file, {source, "01_01", source}, &counts).size(), left.size());
+  EXPECT_EQ(counts, (std::vector<size_t>{of_it, 1, of_it})) << "each word counts all that it names";
+  EXPECT_EQ(import_cmu(file, {source.substr(0, source.find('/'))}).size(), left.size());
+  EXPECT_THROW(import_cmu(file, {source.substr(0, 3)}), InputError) << "no part of a name";
   EXPECT_LT(left.size(), all_clips().size());
   EXPECT_THROW(import_cmu(file, {"nobody/nothing"}), InputError);
   EXPECT_TRUE(is_packed_clips(file));

@@ -8,6 +8,7 @@
 #include <numeric>
 #include <set>
 
+#include "autograd/base/error.h"
 #include "datasets/sampling/clouds.h"
 #include "nn/geometry/skeleton.h"
 #include "tests/datasets/sampling_support.h"
@@ -110,6 +111,14 @@ TEST(SamplingPartial, NoiseIsAddedUpToTheMost) {
   }
   EXPECT_NEAR(noisy / 1000.0, 0.5, 0.08);
   EXPECT_GT(most, 0.04);
+}
+
+TEST(SamplingPartial, SettingsThatMeanNothingAreRefused) {
+  EXPECT_NO_THROW(batch_of({.points = 64, .noise = 0.06}, 1)) << "nobody asked for more noise";
+  EXPECT_THROW(batch_of({.points = 64, .noise = 0.06, .noisy = 0.1}, 1), InputError);
+  EXPECT_THROW(batch_of({.points = 64, .noisy = 0.1, .most_noise = 1e30}, 1), InputError);
+  EXPECT_THROW(batch_of({.points = 64, .ceiling = 0.5}, 1), InputError) << "no camera";
+  EXPECT_THROW(batch_of({.points = 64, .tilted = 1.5}, 1), InputError);
 }
 
 TEST(SamplingPartial, WhatIsShownTurnedIsTurnedAsAWhole) {

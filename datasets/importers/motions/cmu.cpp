@@ -7,6 +7,7 @@
 #include "datasets/hdf5/file.h"
 #include "datasets/importers/motions/source_motion.h"
 #include "datasets/readers/errors.h"
+#include "datasets/schema.h"
 
 namespace restage {
 namespace {
@@ -17,14 +18,20 @@ struct CmuSkeleton {
   Joints rest;
 };
 
+constexpr const char* kAgain = "fetch the file again";
+
+/// InputError for what is no length in metres.
+void check_length(const std::string& where, double x) {
+  if (!(std::abs(x) <= 1e6))
+    throw InputError(where, "holds a number that is no length in metres", kAgain);
+}
+
 std::vector<Vec3> read_points(const h5::File& file, const std::string& name, int64_t rows) {
   const std::vector<double> values = file.read<double>(name, {rows, 3});
   std::vector<Vec3> out(values.size() / 3);
   for (size_t i = 0; i < out.size(); ++i) {
     out[i] = Vec3(values[3 * i], values[3 * i + 1], values[3 * i + 2]);
-    if (!out[i].allFinite() || out[i].cwiseAbs().maxCoeff() > 1e6)
-      throw InputError(file.path() + ":" + name, "holds a number that is no length in metres",
-                       "fetch the file again");
+    for (const double x : out[i]) check_length(file.path() + ":" + name, x);
   }
   return out;
 }
@@ -77,14 +84,19 @@ RawClip read_clip(const h5::File& file, const std::string& name,
   const h5::Dataset rotations = file.dataset(group + "/local_rotations", {-1, joints, 4});
   out.rotations = rotations.read<int16_t>();
   out.root = file.read<double>(group + "/root_translation", {rotations.rows(), 3});
+  if (out.root.empty()) throw InputError(file.path() + ":" + group, "has no frames", kAgain);
   const auto floor_y = file.number(group, "floor_y");
-  if (!floor_y || !std::isfinite(*floor_y))
-    throw InputError(file.path() + ":" + group, "has no attribute 'floor_y'",
-                     "fetch the file again");
+  if (!floor_y) throw InputError(file.path() + ":" + group, "has no attribute 'floor_y'", kAgain);
   out.floor_y = *floor_y;
+  for (const double x : out.root) check_length(file.path() + ":" + group + "/root_translation", x);
+  check_length(file.path() + ":" + group + "/floor_y", out.floor_y);
   out.labels.id = name;
   out.labels.subject = need_text(file, group, "subject");
   out.labels.split = need_text(file, group, "split");
+  if (!is_split(out.labels.split))
+    throw InputError(file.path() + ":" + group,
+                     "has the split '" + out.labels.split.substr(0, 40) + "'",
+                     "write train, validation or test into its attribute 'split'");
   out.labels.action = need_text(file, group, "action");
   return out;
 }
@@ -109,8 +121,6 @@ CmuClip convert(const RawClip& raw, bool with_joints, const std::string& where) 
   for (size_t f = 0; f < frames; ++f) {
     for (size_t j = 0; j < n; ++j) one.local[0][j] = unpack(&raw.rotations[(f * n + j) * 4], where);
     one.position[0][0] = Vec3(raw.root[3 * f], raw.root[3 * f + 1], raw.root[3 * f + 2]);
-    if (!one.position[0][0].allFinite())
-      throw InputError(where, cat("frame ", f, " has no finite position"), "fetch it again");
     poses[f] = source_pose(one, raw.skeleton->map, 0);
     if (with_joints) out.joints.push_back(poses[f].joints);
   }
@@ -138,6 +148,13 @@ std::vector<CmuClip> read_clips(const h5::File& file, const std::vector<std::str
   return out;
 }
 
+/// Whether `word` is a source, or what stands before or behind its slash.
+bool is_part(const std::string& word, const std::string& source) {
+  const size_t slash = source.find('/');
+  return !word.empty() && (word == source || word == source.substr(0, slash) ||
+                           (slash != std::string::npos && word == source.substr(slash + 1)));
+}
+
 std::vector<Motion> motions_of(std::vector<CmuClip> clips) {
   std::vector<Motion> out;
   for (CmuClip& clip : clips) out.push_back(std::move(clip.motion));
@@ -153,21 +170,31 @@ std::vector<CmuClip> read_cmu(const std::string& path, bool with_joints) {
 
 std::vector<Motion> import_cmu(const std::string& path) { return motions_of(read_cmu(path)); }
 
-std::vector<Motion> import_cmu(const std::string& path, const std::vector<std::string>& without) {
+std::vector<Motion> import_cmu(const std::string& path, const std::vector<std::string>& without,
+                               std::vector<size_t>* left_out) {
   const h5::File file = h5::File::open(path);
-  std::vector<std::string> names = clip_names(file);
-  for (const std::string& text : without) {
-    const size_t left_out = std::erase_if(names, [&](const std::string& name) {
-      return name == text ||
-             need_text(file, "/clips/" + name, "source").find(text) != std::string::npos;
-    });
-    if (left_out == 0)
-      throw InputError(path,
-                       "no clip has the name '" + text.substr(0, 40) + "' or a source with it",
-                       "name a clip, or a part of its attribute 'source'");
+  const std::vector<std::string> names = clip_names(file);
+  std::vector<size_t> counts(without.size());
+  std::vector<std::string> kept;
+  for (const std::string& name : names) {
+    const std::string source = file.text("/clips/" + name, "source").value_or("");
+    bool stays = true;
+    for (size_t i = 0; i < without.size(); ++i) {
+      if (name != without[i] && !is_part(without[i], source)) continue;
+      ++counts[i];
+      stays = false;
+    }
+    if (stays) kept.push_back(name);
   }
-  if (names.empty()) throw InputError(path, "all clips are left out", "leave out fewer");
-  return motions_of(read_clips(file, names, false));
+  for (size_t i = 0; i < without.size(); ++i)
+    if (counts[i] == 0)
+      throw InputError(path,
+                       "no clip has the name or the source '" + without[i].substr(0, 40) + "'",
+                       "name a clip, or one part of its attribute 'source', such as the user in "
+                       "'user/repository'");
+  if (kept.empty()) throw InputError(path, "all clips are left out", "leave out fewer");
+  if (left_out != nullptr) *left_out = counts;
+  return motions_of(read_clips(file, kept, false));
 }
 
 bool is_packed_clips(const std::string& path) {

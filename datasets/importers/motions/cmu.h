@@ -24,10 +24,12 @@ struct CmuClip {
 /// InputError: missing, damaged or of another layout.
 std::vector<CmuClip> read_cmu(const std::string& file, bool with_joints = false);
 std::vector<Motion> import_cmu(const std::string& file);
-/// The clips that are not named in `without`, and whose attribute `source`, which says whose copy
-/// of the recordings a clip was made from, holds none of these texts. InputError for a text that is
-/// no clip's name and in no clip's source.
-std::vector<Motion> import_cmu(const std::string& file, const std::vector<std::string>& without);
+/// The same without the clips that `without` names: by their name, or by a part of their attribute
+/// `source`, which says whose copy of the recordings a clip was made from ("maxxgx" or
+/// "motion-graphs" of "maxxgx/motion-graphs", or all of it). Puts into `left_out`, if it is given,
+/// how many each of them named. InputError for one that names no clip.
+std::vector<Motion> import_cmu(const std::string& file, const std::vector<std::string>& without,
+                               std::vector<size_t>* left_out = nullptr);
 
 /// Whether a file holds clips in this layout.
 bool is_packed_clips(const std::string& file);

@@ -150,8 +150,8 @@ void add_data_import(Program& program, CommandOptions group) {
   app.add_option("--betas", options.betas,
                  "people of a body model: NPZ or NPY files, or zeros for the mean person");
   app.add_option("--without", options.without,
-                 "packed clips: leave out those of this name, or whose attribute 'source' has this "
-                 "in it");
+                 "packed clips: leave out these, by name or by a part of the attribute 'source' "
+                 "(the user in user/repository)");
   app.add_option("--garment", options.garment,
                  "data folder: dress the bodies (a file of body/clothes) (default: naked)");
 }

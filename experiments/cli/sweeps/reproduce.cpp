@@ -55,6 +55,16 @@ void check(const ReproduceOptions& o, const Common& common) {
                        "leave it out");
 }
 
+/// A word of a command without a folder of this machine: /a/b/c is runs/c, also behind --out= and
+/// key=.
+std::string for_other_machines(const std::string& word) {
+  const size_t begin = word.find('=') + 1;  // 0 where there is none
+  std::filesystem::path path = word.substr(begin);
+  if (!path.is_absolute()) return word;
+  if (!path.has_filename()) path = path.parent_path();
+  return word.substr(0, begin) + "runs/" + path.filename().string();
+}
+
 std::string key_of(const std::string& word) {
   const std::string key = word.substr(0, word.find('='));
   return key == "seed" ? "seeds" : key;
@@ -194,9 +204,7 @@ int run_reproduce(ReproduceOptions o, const Common& common) {
   const bool done = o.no_run || run_trials(o, all);
   reproduce::PageOptions options{o.paper, o.budget, common.command_line};
   options.command[0] = "restage";
-  for (std::string& word : options.command)  // a page is for other machines
-    if (const std::filesystem::path path = word; path.is_absolute())
-      word = "runs/" + path.filename().string();
+  for (std::string& word : options.command) word = for_other_machines(word);
   const std::vector<reproduce::Found> found = reproduce::found(all, options, o.page);
   for (const auto& one : found)
     for (const std::string& notice : one.results.notices) log_warning(on_one_line(notice));

@@ -15,7 +15,7 @@ void visit(V& v, SplitRecipe& c) {
 template <class V>
 void visit(V& v, MoreClipsRecipe& c) {
   v("file", c.file, "packed clips of CMU, below the data folder", required());
-  v("train", c.train, "all of them are for training; else only to be named");
+  v("train", c.train, "all of its clips are in train.h5; else only those that the recipe names");
   v("without", c.without, "clips to leave out, by name or by a part of their attribute 'source'");
 }
 
