@@ -21,7 +21,7 @@ struct CmuSkeleton {
 constexpr const char* kAgain = "fetch the file again";
 
 /// InputError for what is no length in metres.
-void check_length(const std::string& where, double x) {
+void check_metres(const std::string& where, double x) {
   if (!(std::abs(x) <= 1e6))
     throw InputError(where, "holds a number that is no length in metres", kAgain);
 }
@@ -31,7 +31,7 @@ std::vector<Vec3> read_points(const h5::File& file, const std::string& name, int
   std::vector<Vec3> out(values.size() / 3);
   for (size_t i = 0; i < out.size(); ++i) {
     out[i] = Vec3(values[3 * i], values[3 * i + 1], values[3 * i + 2]);
-    for (const double x : out[i]) check_length(file.path() + ":" + name, x);
+    for (const double x : out[i]) check_metres(file.path() + ":" + name, x);
   }
   return out;
 }
@@ -88,8 +88,8 @@ RawClip read_clip(const h5::File& file, const std::string& name,
   const auto floor_y = file.number(group, "floor_y");
   if (!floor_y) throw InputError(file.path() + ":" + group, "has no attribute 'floor_y'", kAgain);
   out.floor_y = *floor_y;
-  for (const double x : out.root) check_length(file.path() + ":" + group + "/root_translation", x);
-  check_length(file.path() + ":" + group + "/floor_y", out.floor_y);
+  for (const double x : out.root) check_metres(file.path() + ":" + group + "/root_translation", x);
+  check_metres(file.path() + ":" + group + "/floor_y", out.floor_y);
   out.labels.id = name;
   out.labels.subject = need_text(file, group, "subject");
   out.labels.split = need_text(file, group, "split");
