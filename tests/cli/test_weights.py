@@ -89,6 +89,37 @@ class Weights(CliTest):
         self.assertEqual(listed["missing"], ["fc2.bias", "fc3.bias"])
         self.assertFalse(os.path.exists(self.path("w.safetensors")))
 
+    def test_between_two_files(self):
+        def values(name):
+            blob = self.bytes(name)
+            size = struct.unpack("<Q", blob[:8])[0]
+            head = json.loads(blob[8:8 + size])
+            return {key: struct.unpack("<%df" % ((b - a) // 4), blob[8 + size + a:8 + size + b])
+                    for key, (a, b) in ((k, v["data_offsets"]) for k, v in head.items() if k != "__metadata__")}
+
+        shapes = {"a": [2, 3], "b": [4]}
+        self.write("x.safetensors", tensors(shapes, 1))
+        self.write("y.safetensors", tensors(shapes, 2))
+        call = ["weights", "average", "--source", "x.safetensors", "--other", "y.safetensors"]
+        x, y = values("x.safetensors"), values("y.safetensors")
+        for share in (0, 0.75, 1):
+            self.done(*call, "--share", str(share), "--out", "m.safetensors")
+            m = values("m.safetensors")
+            self.assertEqual(set(m), set(x))
+            for key in x:
+                for a, b, c in zip(x[key], y[key], m[key]):
+                    self.assertAlmostEqual((1 - share) * a + share * b, c, 6)
+        self.assertEqual(m, y)
+        self.done(*call, "--out", "m.safetensors")
+        self.assertAlmostEqual(values("m.safetensors")["b"][0], (x["b"][0] + y["b"][0]) / 2, 6)
+        for other in ({"a": [2, 3]}, {"a": [3, 2], "b": [4]}, {**shapes, "c": [1]}):
+            self.write("z.safetensors", tensors(other))
+            self.bad_input(["weights", "average", "--source", "x.safetensors", "--other", "z.safetensors", "--out", "n.safetensors"],
+                           "z.safetensors", "same models and sizes")
+        self.bad_input([*call, "--share", "1.5", "--out", "n.safetensors"], "--share 1.5", "0 to 1")
+        self.bad_input([*call, "--out", "x.safetensors"], "x.safetensors")
+        self.assertFalse(os.path.exists(self.path("n.safetensors")))
+
     def test_bad_input(self):
         good = self.write("o.safetensors", tensors(OFFSETS))
         cut = self.write("cut.safetensors", tensors(OFFSETS)[:5000])

@@ -1,4 +1,5 @@
-// restage weights: what a weights file holds; single models into and out of it.
+// restage weights: what a weights file holds; single models into and out of it; between two files.
+#include <type_traits>
 
 #include "autograd/base/error.h"
 #include "autograd/base/log.h"
@@ -136,6 +137,65 @@ int run_weights_export(const Transfer& t, const Common& common) {
   return report(t, out, common);
 }
 
+// ---- average -----------------------------------------------------------------------------------
+
+struct Average {
+  std::string from, other, out;
+  double share = 0.5;
+};
+
+/// `from` plus `share` of the way to `other`, number by number.
+Tensor between(const Tensor& from, const Tensor& other, double share) {
+  Tensor out = from.clone();
+  const auto mix = [&](auto* to, const auto* there) {
+    for (int64_t i = 0; i < out.numel(); ++i)
+      to[i] = static_cast<std::remove_reference_t<decltype(to[i])>>((1 - share) * to[i] +
+                                                                    share * there[i]);
+  };
+  if (out.dtype() == DType::f32)
+    mix(out.data<float>(), other.data<float>());
+  else if (out.dtype() == DType::f64)
+    mix(out.data<double>(), other.data<double>());
+  return out;
+}
+
+int run_average(const Average& a, const Common& common) {
+  check_output(a.out, {a.from, a.other});
+  if (!(a.share >= 0 && a.share <= 1))
+    throw InputError("", cat("--share ", a.share, " is out of range"), "give 0 to 1");
+  TensorFile out = read_safetensors(a.from);
+  const TensorFile other = read_safetensors(a.other);
+  for (auto& [name, tensor] : out.tensors) {
+    const auto there = other.tensors.find(name);
+    if (there == other.tensors.end() || there->second.shape() != tensor.shape() ||
+        there->second.dtype() != tensor.dtype())
+      throw InputError(
+          a.other,
+          "has no tensor '" + name.substr(0, 60) + "' of " + tensor.shape().str() + " as " + a.from,
+          "give weights of the same models and sizes");
+    tensor = between(tensor, there->second, a.share);
+  }
+  if (other.tensors.size() != out.tensors.size())
+    throw InputError(a.other, "has more tensors than " + a.from,
+                     "give weights of the same models and sizes");
+  write_safetensors(a.out, out);
+  print(common.json, {{"out", a.out}, {"tensors", out.tensors.size()}},
+        "wrote " + a.out + ": " + counted(out.tensors.size(), "tensor") + "\n");
+  return 0;
+}
+
+void add_average(Program& program, CommandOptions group) {
+  auto [app, a] = program.add(
+      group, "average", "weights between those of two files, of one network trained further",
+      "restage weights average --source before.safetensors --other after.safetensors --share 0.75 "
+      "--out between.safetensors",
+      run_average);
+  app.add_option("--source", a.from, "weights file").required();
+  app.add_option("--other", a.other, "weights file of the same models and sizes").required();
+  app.add_option("--share", a.share, "how far to go from the first to the other, 0 to 1");
+  app.add_option("--out", a.out, "weights file to write").required();
+}
+
 void add_import(Program& program, CommandOptions group) {
   auto [app, t] = program.add(
       group, "import", "put a state dict from elsewhere into a weights file",
@@ -196,6 +256,7 @@ void add_weights(Program& program) {
   show.add_option("FILE", file, "safetensors file").required();
   add_import(program, group);
   add_export(program, group);
+  add_average(program, group);
 }
 
 }  // namespace restage::cli
