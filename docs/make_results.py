@@ -233,7 +233,7 @@ def real():
 def kinds_table():
     one, metrics = kinds["standard"], ("pa_mpjpe", "mpjpe", "pa_mpvd", "acc")
     rows = [Row("**as `retarget` does**: two frames late, bones and limbs held", late_kinds["standard, two frames late"]),
-            Row("the same with the [captures weights](real_scans.md#wide-clothes-things-near-the-body)", captures),
+            Row("the same with the [captures weights](real_scans.md#what-the-captures-weights-know)", captures),
             Row("at once, bones held", late_kinds["standard, at once"]), Row("standard: at once, bones not held", one),
             Row("no motion network", kinds["no motion network"]),
             Row("lite", kinds["lite"])]

@@ -204,7 +204,8 @@ def aligned(found, truth):
 def judge(p, effect, weights):
     seen, factor = clouds(p, effect)
     words = [] if weights is None else [weights]
-    system = restage.System(p.target, *words, late=True)
+    # Seen from above, feet and shoulders lie apart, as two people would: that has to be said.
+    system = restage.System(p.target, *words, late=True, force=effect == "from the ceiling")
     frames = [f for cloud in seen for f in system.push_all(cloud)] + system.finish()
     joints, turns = np.stack([f.joints for f in frames]), np.stack([f.rotations for f in frames])
     extract = restage.Extractor(*words)
@@ -223,9 +224,10 @@ def main():
     words.add_argument("--weights", help="default: the standard weights")
     words.add_argument("--program", default="build/release/restage")
     words.add_argument("--effects", nargs="*", default=EFFECTS, choices=EFFECTS, metavar="EFFECT", help="only these")
-    words.add_argument("--out", required=True, help="a JSON file")
+    words.add_argument("--out", required=True, help="a JSON file; other effects that it has stay in it")
     given = words.parse_args()
-    found = {}
+    out = pathlib.Path(given.out)
+    found = json.loads(out.read_text()) if out.exists() else {}
     with tempfile.TemporaryDirectory() as folder:
         performances = {f"{clip} {body}": Performance(given.data, body, clip, given.program, f"{folder}/{clip}-{body}")
                         for clip in CLIPS for body in BODIES}
@@ -235,7 +237,7 @@ def main():
             found[effect] = {"mean": mean, "sequences": each}
             print(f"| {effect} | {1e3 * mean['pa_mpjpe']:.1f} | {mean['rotation_deg']:.1f} | "
                   f"{100 * mean['rotation_over_90']:.2f} | {100 * mean['joints_within_radius']:.0f} |", flush=True)
-    pathlib.Path(given.out).write_text(json.dumps(found, indent=1) + "\n")
+            out.write_text(json.dumps(found, indent=1) + "\n")
 
 
 if __name__ == "__main__":
