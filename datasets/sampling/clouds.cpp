@@ -87,21 +87,6 @@ float lowest(const Points& points) {
   return out;
 }
 
-/// Cuts what lies below a height, as whoever removes a floor from scans does.
-void cut_below(float above, Points& points, std::vector<size_t>& which) {
-  constexpr std::ptrdiff_t kLeast = 64;  // fewer: somebody lies
-  const auto stays = [&](const Point& p) { return p.y() >= above; };
-  if (std::count_if(points.begin(), points.end(), stays) < kLeast) return;
-  size_t kept = 0;
-  for (size_t i = 0; i < points.size(); ++i) {
-    if (!stays(points[i])) continue;
-    points[kept] = points[i];
-    which[kept++] = which[i];
-  }
-  points.resize(kept);
-  which.resize(kept);
-}
-
 /// The same, its frames earlier, but not before the first.
 CloudSubject step_back(CloudSubject subject) {
   for (FrameRef* at : {&subject.at, &subject.limb_at})
@@ -294,8 +279,9 @@ CloudSampler::Seen CloudSampler::see(const CloudSubject& subject, size_t n, cons
     put_thing(scene.fold("thing"), key.fold("thing"), subject.sensor != Sensor::none, &out);
   if (subject.intruder) intrude(scene.fold("intruder"), key.fold("intruder"), &out);
   if (subject.cut_floor)
-    cut_below(floor + static_cast<float>(Rng(scene.fold("floor")).uniform(0.01, 0.08)), out.points,
-              out.which);
+    keep_beyond(Point::UnitY(),
+                floor + static_cast<float>(Rng(scene.fold("floor")).uniform(0.01, 0.08)),
+                out.points, out.which);
   if (subject.cropped) {
     Rng rng(scene.fold("cut"));
     cut_away(draw_cut(rng), out.points, out.which);

@@ -19,14 +19,8 @@ Cut draw_cut(Rng& rng) {
   return out;
 }
 
-void cut_away(const Cut& cut, Points& points, std::vector<size_t>& which) {
-  float low = std::numeric_limits<float>::max(), high = std::numeric_limits<float>::lowest();
-  for (const Point& p : points) {
-    low = std::min(low, cut.towards.dot(p));
-    high = std::max(high, cut.towards.dot(p));
-  }
-  const float edge = low + static_cast<float>(cut.share) * (high - low);
-  const auto stays = [&](const Point& p) { return cut.towards.dot(p) >= edge; };
+void keep_beyond(const Point& towards, float edge, Points& points, std::vector<size_t>& which) {
+  const auto stays = [&](const Point& p) { return towards.dot(p) >= edge; };
   if (std::count_if(points.begin(), points.end(), stays) < std::ptrdiff_t{kLeastPoints}) return;
   size_t kept = 0;
   for (size_t i = 0; i < points.size(); ++i) {
@@ -36,6 +30,15 @@ void cut_away(const Cut& cut, Points& points, std::vector<size_t>& which) {
   }
   points.resize(kept);
   which.resize(kept);
+}
+
+void cut_away(const Cut& cut, Points& points, std::vector<size_t>& which) {
+  float low = std::numeric_limits<float>::max(), high = std::numeric_limits<float>::lowest();
+  for (const Point& p : points) {
+    low = std::min(low, cut.towards.dot(p));
+    high = std::max(high, cut.towards.dot(p));
+  }
+  keep_beyond(cut.towards, low + static_cast<float>(cut.share) * (high - low), points, which);
 }
 
 void thin_out(Rng& rng, size_t most, Points& points, std::vector<size_t>& which) {

@@ -21,6 +21,9 @@ struct Cut {
 /// Three of five are desks: all below something between shins and chest is hidden, and in one of
 /// three of these everything below the hips. The others hide up to 40 % from any direction.
 Cut draw_cut(Rng& rng);
+/// Leaves out of `points` and `which`, which is as long, what does not lie `edge` or more along
+/// `towards`; but at least kLeastPoints stay, or nothing is left out.
+void keep_beyond(const Point& towards, float edge, Points& points, std::vector<size_t>& which);
 /// Leaves what is hidden out of `points` and `which`, which is as long; but at least kLeastPoints
 /// stay, or nothing is cut.
 void cut_away(const Cut& cut, Points& points, std::vector<size_t>& which);
