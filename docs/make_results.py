@@ -164,7 +164,6 @@ shipped, seeds = trials("shipped"), trials("standard_seeds")
 benchmark, kinds = trials("benchmark"), trials("kinds_of_cloud")
 late_trials = trials("standard_late")["two frames late"]
 late_kinds = trials("standard_late/kinds")
-captures = trials("captures/kinds")["captures, two frames late"]
 
 standard = Row("**standard**", shipped["standard"] + seeds["standard"])
 no_motion = Row("no motion network", shipped["no motion network"] + seeds["no motion network"])
@@ -233,7 +232,6 @@ def real():
 def kinds_table():
     one, metrics = kinds["standard"], ("pa_mpjpe", "mpjpe", "pa_mpvd", "acc")
     rows = [Row("**as `retarget` does**: two frames late, bones and limbs held", late_kinds["standard, two frames late"]),
-            Row("the same with the [captures weights](real_scans.md#what-the-captures-weights-know)", captures),
             Row("at once, bones held", late_kinds["standard, at once"]), Row("standard: at once, bones not held", one),
             Row("no motion network", kinds["no motion network"]),
             Row("lite", kinds["lite"])]

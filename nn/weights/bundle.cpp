@@ -293,7 +293,7 @@ Bundle bundle_of(const TensorFile& file, const std::string& where) {
   return out;
 }
 
-/// A name ("captures") is that of weights that come with the program, where neither a file nor a
+/// A name ("lite") is that of weights that come with the program, where neither a file nor a
 /// run is called so.
 std::string weights_path(const std::string& given) {
   namespace fs = std::filesystem;
@@ -310,7 +310,7 @@ std::string weights_path(const std::string& given) {
                      "give a weights file, a finished run or an artifact");
   if (given.find_first_of("./") == std::string::npos)
     throw InputError(given, "is no file here, and no weights of this name come with the program",
-                     "give a weights file, a finished run, or standard, captures or lite");
+                     "give a weights file, a finished run, standard or lite");
   return path;
 }
 

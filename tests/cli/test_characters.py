@@ -225,7 +225,7 @@ class Characters(CliTest):
             self.bad_input([*call, "--out", "x.glb", *option], "walk.bvh", option[0], "--from-surface")
         for option in (["--weights", "lite"], ["--device", "cuda"], ["--asf", "walk.asf"]):
             self.bad_input([*call, "--out", "x.glb", *option], "walk.bvh", "leave " + option[0] + " out")
-        self.bad_input([*call, "--out", "x.glb", "--weights", "w"], "w:", "standard, captures or lite")
+        self.bad_input([*call, "--out", "x.glb", "--weights", "w"], "w:", "standard or lite")
         self.bad_input([*call, "--out", "x.glb", "--format", "ply"], "x.glb", "leave --format out")
         self.bad_input([*call, "--out", "x.glb", "--clip", "walk"], "leave --clip out")
         self.bad_input([*call, "--out", "x.glb", "--body-model", "hero.glb"], "walk.bvh", "leave --body-model out")

@@ -84,7 +84,7 @@ void exchange(std::vector<JointTrack>* tracks, size_t frames, Team& team) {
 std::vector<JointTrack> asked(const Corpus& corpus, const AnswersConfig& config,
                               const Bundle& given, uint64_t seed, Team& team) {
   JointExtractor extractor(given.need_as<SkeletonModel>("skeleton", kWhere),
-                           {.samples = config.views});
+                           {.samples = config.views, .any_way_up = config.any_way_up});
   log_info("motion: the extractor is asked about " + std::to_string(config.tracks.sequences) +
            " sequences");
   const auto extract = [&](const Points& cloud, const RngKey& key, const SeenJoints* before) {

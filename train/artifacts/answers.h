@@ -16,6 +16,7 @@ namespace restage {
 struct AnswersConfig {
   TrackConfig tracks;
   int views = 4;
+  bool any_way_up = false;
 };
 
 template <class V>
@@ -25,6 +26,8 @@ void visit(V& v, AnswersConfig& c) {
     at_least(0));
   v("frames", c.tracks.frames, "frames of each", at_least(2));
   v("views", c.views, "of each cloud, as retarget --samples", between(1, 256));
+  v("any_way_up", c.any_way_up,
+    "who lies or stands on the hands is shown upright, as 'restage retarget' does", added("false"));
   v("noise", c.tracks.clouds.noise, "Gaussian noise per coordinate of a cloud, metres",
     at_least(0));
   v("dressed", c.tracks.clouds.dressed, "part of the performers in clothes and hair",

@@ -341,7 +341,7 @@ void add_live_options(CommandOptions app, RetargetCommand& c) {
 
 void add_weights_options(CommandOptions app, RetargetCommand& c) {
   app.add_option("--weights", c.weights,
-                 "weights file, run, artifact, or standard, captures or lite (default: standard)");
+                 "weights file, run, artifact, standard or lite (default: standard)");
   app.add_option("--system", c.system, help_of_systems());
   app.add_option("--rest", c.rest,
                  "the target's 22 rest joints (HDF5, /joints [1, 22, 3]) (default: found)");
