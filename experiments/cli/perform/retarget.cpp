@@ -321,6 +321,10 @@ void add_system_options(CommandOptions app, RetargetCommand& c) {
       "comes back within half a second");
   app.add_flag("!--no-foot-lock", c.options.foot_lock,
                "feet that stand are not held where they landed");
+  app.add_option("--floor", c.floor,
+                 "on: soles stand on the floor, and no foot goes below it; off (default: on, but "
+                 "for X.h5 of a target without bones)")
+      .one_of({"on", "off"});
   app.add_flag("!--no-keep-limbs", c.options.keep_limbs,
                "legs and arms that cross are named as each frame shows them");
   app.add_flag("!--no-steady-bones", c.options.steady_bones,
@@ -419,8 +423,14 @@ SinkOptions sink_options(const RetargetCommand& c, const SystemInput& input,
   return out;
 }
 
+bool floor_is_on(const RetargetCommand& c, const TargetMesh& target) {
+  if (!c.floor.empty()) return c.floor == "on";
+  return target.own || !(c.to.out.empty() || text::ends_in(c.to.out, {".h5", ".hdf5"}));
+}
+
 std::unique_ptr<System> system_for(const RetargetCommand& c, SystemInput input,
                                    TargetMesh& target) {
+  input.options.floor = floor_is_on(c, target);
   if (!c.rest.empty()) input.rest = rest_joints(c.rest);
   joints_given(c, input);
   if (target.own && !c.rest.empty())
