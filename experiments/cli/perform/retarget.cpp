@@ -399,6 +399,8 @@ SystemInput load_input(const RetargetCommand& c, const Common& common) {
   const SystemType& type = system_type(c.system);
   if (!c.rest.empty() && !type.own_skin)  // it moves vertices without joints
     throw InputError("", "--rest says nothing to --system " + type.name, "leave it out");
+  if (!c.floor.empty() && std::count(type.roles.begin(), type.roles.end(), "skeleton") == 0)
+    throw InputError("", "--floor says nothing to --system " + type.name, "leave it out");
   if (c.weights.empty() && type.roles.empty()) return input;
   const std::string weights = c.weights.empty() ? standard_weights() : c.weights;
   input.weights_name = weights_path(weights);
@@ -473,7 +475,7 @@ void add_retarget(Program& program) {
       "--no-foot-lock\n"
       "restage retarget --source s.h5 --target a.ply --out r.h5 --no-steady-bones --no-keep-limbs "
       "--online\n"
-      "restage retarget --source s.h5 --target a.ply --out r.h5 --joints smpl\n"
+      "restage retarget --source s.h5 --target a.ply --out r.h5 --joints smpl --floor on\n"
       "restage retarget --source scans.h5 --target hero.ply --system register --rest rest.h5 "
       "--out r.h5",
       run_retarget);
