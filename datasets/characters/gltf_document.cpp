@@ -143,8 +143,8 @@ void GltfDocument::append(const Clip& clip) {
         {{"sampler", samplers.size()}, {"target", {{"node", node}, {"path", path}}}});
     samplers.push_back({{"input", input}, {"interpolation", "LINEAR"}, {"output", output}});
   };
-  channel(clip.hips, "translation",
-          accessor(clip.places.data(), clip.places.size(), "VEC3", clip.frames));
+  for (const auto& [node, places] : clip.moves)
+    channel(node, "translation", accessor(places.data(), places.size(), "VEC3", clip.frames));
   for (const auto& [node, turns] : clip.turns)
     channel(node, "rotation", accessor(turns.data(), 4 * turns.size(), "VEC4", clip.frames));
   Json animation = {{"name", clip.name}, {"channels", channels}, {"samplers", samplers}};

@@ -27,8 +27,8 @@ class GltfDocument {
     /// Of all nodes that are turned or moved: translation, rotation (x, y, z, w) and scale, in the
     /// place of a `matrix`, which the format does not let an animation turn.
     std::map<int, std::array<double, 10>> rest;
-    int hips;                   ///< number of the node that is moved
-    std::vector<float> places;  ///< its translation, 3 numbers a frame
+    /// Numbers of the nodes that are moved, and their translations, 3 numbers a frame.
+    std::vector<std::pair<int, std::vector<float>>> moves;
     std::vector<double> confidence;
     std::vector<int64_t> filled;
   };
