@@ -203,7 +203,11 @@ class Finder {
         }
       return found;
     };
-    const int lower = only([&](int b) { return words_[b].part == limb.lower; });
+    const int called = only([&](int b) { return words_[b].part == limb.lower; });
+    const int strong = only([&](int b) { return words_[b].part == limb.upper; });
+    const int lower = called != -1 || strong < 0 ? called : only([&](int b) {
+      return words_[b].part == limb.either && hangs_on(skeleton_, b, strong);
+    });
     if (lower < 0) return out;
     int end = -1;
     for (const BonePart part : limb.ends)
@@ -377,8 +381,9 @@ class Finder {
     for (int b = all + 1; b < size(); ++b)
       if (parent(b) == all && named(b)) beside = b, ++count;
     if (count == 1 && words_[all].part == BonePart::none)
-      return is_among_hips(all) && hangs_on(skeleton_, chest_of(tree_, out_.bones), beside) ? all
-                                                                                           : beside;
+      return is_among_hips(all) && hangs_on(skeleton_, chest_of(tree_, out_.bones), beside)
+                 ? all
+                 : beside;
     const bool carries = legs != all && words_[all].part == BonePart::none &&
                          words_[legs].side == BoneWords::middle && !words_[legs].helper;
     return carries ? legs : all;

@@ -112,12 +112,14 @@ GltfTransforms bind_pose(const Gltf& file, ImportReport& report) {
 
 // ---- names -------------------------------------------------------------------------------------
 
-/// Nodes that may be bones: joints of skins and what hangs on them; all, if there are no skins.
+/// Nodes that may be bones: joints of skins, those of VRM's list, and what hangs on them; all, if
+/// there are no skins.
 std::vector<int> bone_nodes(const Gltf& file) {
   std::vector<bool> is(file.nodes.size());
   bool skins = false;
   for (const GltfBone& bone : file.bones)
     if (bone.skin >= 0) skins = is[bone.node] = true;
+  for (const auto& [name, node] : file.humanoid) is[static_cast<size_t>(node)] = true;
   std::vector<int> out;
   for (size_t n = 0; n < is.size(); ++n) {
     const int p = file.nodes[n].parent;
@@ -338,8 +340,9 @@ void find_carriers(const Gltf& file, GltfRig& rig, const std::vector<int>& owner
                                             : owner[static_cast<size_t>(nearest)];
     if (!left_behind(above, joint)) continue;
     rig.carrier[static_cast<size_t>(node)] = rig.node[static_cast<size_t>(above)];
-    words.push_back(text::quote(file.nodes[static_cast<size_t>(node)].name) + " goes with " +
-                    text::quote(file.nodes[static_cast<size_t>(rig.node[static_cast<size_t>(above)])].name));
+    words.push_back(
+        text::quote(file.nodes[static_cast<size_t>(node)].name) + " goes with " +
+        text::quote(file.nodes[static_cast<size_t>(rig.node[static_cast<size_t>(above)])].name));
   }
   if (!words.empty()) report.fact("bones that hang elsewhere", joined(words));
   std::vector<int> state(count);  // 1: being placed, 2: placed

@@ -53,7 +53,13 @@ auto with_target(const RetargetCommand& c, const TargetMesh& target, const Work&
   try {
     return work();
   } catch (const InputError& error) {
-    if (target.unknown_rig.empty() || !std::string(error.what()).starts_with(c.target)) throw;
+    if (!std::string(error.what()).starts_with(c.target)) throw;
+    if (!target.parts.empty())
+      throw InputError(
+          c.target,
+          cat("has no skin and no bones, but ", target.parts, ", and as one mesh ", error.cause()),
+          "bind its parts to a skeleton in the program that made them, and export again");
+    if (target.unknown_rig.empty()) throw;
     throw InputError(
         c.target, "it would be posed by its rig, which was not recognised: " + target.unknown_rig,
         "say which bone is which joint with --bones names.yaml (docs/formats.md)");
@@ -382,8 +388,8 @@ void check_kept(const RetargetCommand& c, const TargetMesh& target) {
   if (target.unknown_rig.empty() || !c.to.skeleton.empty()) return;
   if (!text::ends_in(c.to.out, {".glb", ".gltf", ".vrm"})) return;
   throw InputError(c.target, "its rig was not recognised: " + target.unknown_rig,
-                   "name its bones with --bones names.yaml, or ask for a skeleton of ours with "
-                   "--skeleton restage");
+                   "name its bones with --bones names.yaml; or, if its mesh stands in T-pose, "
+                   "facing +z, ask for a skeleton of ours with --skeleton restage");
 }
 
 void check_mesh(const RetargetCommand& c, const TargetMesh& target) {

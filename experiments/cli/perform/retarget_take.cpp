@@ -136,7 +136,7 @@ Retargeted run_take(const RetargetCommand& c, const Common& common, const Retarg
   if (target.own) check_no_network(c);
   SystemInput input;
   if (!target.own) {
-    if (!c.options.force) check_target(target.mesh, c.target, target.known());
+    check_mesh(c, target);
     input = load_input(c, common);
   }
   const SinkOptions to = sink_options(c, input, target);
