@@ -154,7 +154,7 @@ TEST_F(Characters, WhatWouldBeTornIsRefused) {
     bent.local[j] = Eigen::AngleAxisd(0.1, Vec3::UnitX()).toRotationMatrix();
   target.own->place(bent, nullptr, &joints, nullptr);
   for (const int j : {6, 9})
-    bent.local[j] = Eigen::AngleAxisd(0.7, Vec3::UnitX()).toRotationMatrix();
+    bent.local[j] = Eigen::AngleAxisd(1.5, Vec3::UnitX()).toRotationMatrix();
   EXPECT_THROW(target.own->place(bent, nullptr, &joints, nullptr), InputError);
 }
 
