@@ -160,23 +160,17 @@ def said(row, other, kind, metric):
 
 # ---- the rows ------------------------------------------------------------------------------------
 
-shipped, seeds = trials("shipped"), trials("standard_seeds")
+ours, seeds = trials("standard"), trials("standard_seeds")
 benchmark, kinds = trials("benchmark"), trials("kinds_of_cloud")
-late_trials = trials("standard_late")["two frames late"]
-late_kinds = trials("standard_late/kinds")
 
-standard = Row("**standard**", shipped["standard"] + seeds["standard"])
-no_motion = Row("no motion network", shipped["no motion network"] + seeds["no motion network"])
+standard = Row("**standard**", ours["at once"])
+late = Row("**standard, two frames late**", ours["two frames late"])
+no_motion = Row("no motion network", trials("shipped")["no motion network"])
 lite = Row("lite (earlier program)", benchmark["Restage lite"])
 register = Row("register, then repose", benchmark["register then repose"])
-closed_form = Row("closed form", shipped["standard"], "closed_form")
-unchanged = Row("source unchanged", shipped["standard"], "source_unchanged")
-copied_by_each = Row("", standard.trials, "source_unchanged")
-rest_pose = Row("rest pose", shipped["standard"], "rest_pose")
-
-late = Row("**standard, two frames late**", late_trials)
-at_once = Row("at once", shipped["standard"])
-late_shipped = Row("two frames late", late_trials[:1])  # of the same seed as at_once
+closed_form, unchanged, rest_pose = (Row(name.replace("_", " "), standard.trials, name)
+                                     for name in ("closed_form", "source_unchanged", "rest_pose"))
+earlier = Row("the weights before", seeds["standard"])
 
 SETS = {"test": "more motions", "naked": "naked", "clothed": "clothed", "scans:-rig": "eight cameras",
         "scans:-depth": "one camera"}
@@ -197,13 +191,15 @@ GLANCE = {"naked": "naked, whole", "clothed": "clothed, whole", "test": "more mo
 
 def glance_rows():
     """README.md shows some of these columns."""
-    def seeds_of(kind, metric):
-        each = standard.each(kind, metric)
-        return f"{number(mean(each), metric)} ± {number(deviation(each), metric)}"
-    def copied(kind, metric):
-        return number(unchanged.value(kind, metric), metric)
-    return [[f"{words} ({count(standard, k)})", seeds_of(k, "pa_mpjpe"), copied(k, "pa_mpjpe"), seeds_of(k, "pa_mpvd"),
-             seeds_of(k, "mpjpe"), copied(k, "mpjpe")] for k, words in GLANCE.items()]
+    def both(kind, metric):
+        return [number(row.value(kind, metric), metric) for row in (standard, unchanged)]
+    return [[f"{words} ({count(standard, k)})", *both(k, "pa_mpjpe"), number(standard.value(k, "pa_mpvd"), "pa_mpvd"), *both(k, "mpjpe")]
+            for k, words in GLANCE.items()]
+
+
+def seeds_differ():
+    """How far three trainings of the weights before differed."""
+    return ", ".join(f"{words} {number(deviation(earlier.each(kind, 'pa_mpjpe')), 'pa_mpjpe')}" for kind, words in GLANCE.items())
 
 
 def glance():
@@ -222,7 +218,7 @@ def by_set(metrics, rows, told=False):
 
 
 def real():
-    rows = [[SETS[kind], *said(standard, copied_by_each, kind, "pa_mpjpe"), *said(standard, no_motion, kind, "pa_mpjpe"),
+    rows = [[SETS[kind], *said(standard, unchanged, kind, "pa_mpjpe"), *said(standard, no_motion, kind, "pa_mpjpe"),
              said(standard, no_motion, kind, "acc")[0]] for kind in SETS]
     head = ["", "PA-MPJPE, standard - source unchanged", "less in", "PA-MPJPE, with - without motion network", "less in",
             "Acc, with - without motion network"]
@@ -230,17 +226,15 @@ def real():
 
 
 def kinds_table():
-    one, metrics = kinds["standard"], ("pa_mpjpe", "mpjpe", "pa_mpvd", "acc")
-    rows = [Row("**as `retarget` does**: two frames late, bones and limbs held", late_kinds["standard, two frames late"]),
-            Row("at once, bones held", late_kinds["standard, at once"]), Row("standard: at once, bones not held", one),
-            Row("no motion network", kinds["no motion network"]),
-            Row("lite", kinds["lite"])]
+    metrics = ("pa_mpjpe", "mpjpe", "pa_mpvd", "acc")
+    rows = [Row("**as `retarget` does**: two frames late, bones and limbs held", kinds["as retarget does"]),
+            *(Row(case, kinds[case]) for case in ("at once, bones held", "at once, bones not held", "no motion network", "lite"))]
     head = ["", *(f"{KINDS[k]} ({count(rows[0], k)})" for k in KINDS)]
     return table(head, [[r.label, *cells(r, KINDS, metrics)] for r in rows])
 
 
 def rotations():
-    late, at_once = late_kinds["standard, two frames late"], late_kinds["standard, at once"]
+    late, at_once = kinds["as retarget does"], kinds["at once, bones held"]
     rows = [Row("as `retarget` does", late), Row("at once", at_once), Row("closed form of true joints", late, "closed_form")]
     words = []
     for kind in KINDS:
@@ -257,20 +251,20 @@ def same_for_all():
     """References see true joints, not clouds."""
     said = []
     for words, reference in {"closed form": "closed_form", "source unchanged": "source_unchanged"}.items():
-        figures = set(cells(Row("", kinds["standard"], reference), KINDS, ("pa_mpjpe", "mpjpe", "acc")))
+        figures = set(cells(Row("", kinds["as retarget does"], reference), KINDS, ("pa_mpjpe", "mpjpe", "acc")))
         assert len(figures) == 1, figures
         said.append(f"{words} {figures.pop()}")
     return "; ".join(said)
 
 
 def late_differences():
-    rows = [[SETS[k], *said(late_shipped, at_once, k, "pa_mpjpe"), *said(late_shipped, at_once, k, "acc")] for k in SETS]
+    rows = [[SETS[k], *said(late, standard, k, "pa_mpjpe"), *said(late, standard, k, "acc")] for k in SETS]
     return table(["two frames late - at once", "PA-MPJPE", "less in", "Acc", "less in"], rows)
 
 
 def sure():
     parts = {"test": "more motions", "naked": "naked", "clothed": "clothed", "scans": "scans (8 sequences)"}
-    first = shipped["standard"][0].sets
+    first = standard.trials[0].sets
     curves = {words: first[name]["risk_coverage"] for name, words in parts.items()}
     shares = [f"{100 * point['coverage']:.0f} %" for point in curves["naked"]]
     rows = [[words, *(number(point["pa_mpjpe"], "pa_mpjpe") for point in curve)] for words, curve in curves.items()]
@@ -278,13 +272,13 @@ def sure():
 
 
 def joints():
-    errors = shipped["standard"][0].sets["naked"]["joints"]
+    errors = standard.trials[0].sets["naked"]["joints"]
     sides = {}
     for name, value in errors.items():
         sides.setdefault(re.sub("^(left|right)_|[123]$", "", name), []).append(value)
     ordered = sorted(sides.items(), key=lambda item: mean(item[1]))
     errors = ", ".join(f"{name} {number(mean(values), 'pa_mpjpe')}" for name, values in ordered)
-    return textwrap.fill("**By joint** (standard, naked, seed 1, PA-MPJPE, mean of both sides): " + errors, 119)
+    return textwrap.fill("**By joint** (standard, naked, PA-MPJPE, mean of both sides): " + errors, 119)
 
 
 # ---- the page ------------------------------------------------------------------------------------
@@ -299,20 +293,20 @@ brackets: sequences.
 
 ## At a glance
 
-Standard weights, mean of {seed_count} seeds ± sample deviation. Joints: PA-MPJPE and MPJPE (not aligned). Surface:
+Standard weights, one training. Joints: PA-MPJPE and MPJPE (not aligned). Surface:
 PA-MPVD. "Source unchanged" hands on the source's true skeleton.
 
 {glance}
 
-* Seeds share two of the networks' parts. So the true spread is larger. Seed 1 is shipped.
+* Three trainings of the weights before these ([seeds](../experiments/studies/standard_seeds/sweep.yaml)) differed in joints by a sample
+  deviation of {seeds_differ}. They share two of the networks' parts, so the true spread is larger.
 * **The tables are of sweeps, which do not [hold bones](real_scans.md#one-person-is-one-skeleton) and do not [keep the
   names of limbs](real_scans.md#limbs-that-cross-keep-their-names).** `retarget` does both. The
   effect of held bones is [below](#four-kinds-of-cloud-pa-mpjpe--mpjpe--pa-mpvd--acc).
 
 ## The benchmark's sets
 
-Means of the seeds: {seed_count} of standard (also without a motion network), {late_count} of [two frames
-late](#two-frames-late), {lite_count} of lite, one of the others. "Is told": what the system knows of source and target.
+Lite is the mean of {lite_count} seeds, all others are one training. "Is told": what the system knows of source and target.
 
 **Joints: PA-MPJPE / MPJPE**
 
@@ -334,8 +328,8 @@ late](#two-frames-late), {lite_count} of lite, one of the others. "Is told": wha
 
 ## Is a difference real?
 
-Differences, before rounding, are paired over seeds and sequences, with [95 % intervals](metrics.md#when-is-a-difference-real), which err
-more often where seeds or sequences are few. Bold: the interval does not contain zero. A negative difference is better.
+Differences, before rounding, are paired over sequences, with [95 % intervals](metrics.md#when-is-a-difference-real), which err
+more often where sequences are few. Bold: the interval does not contain zero. A negative difference is better.
 "Less in": of the sequences.
 
 In [a training of a quarter of the steps](reproduction/ours.md) the motion network's gain in PA-MPJPE cannot be told.
@@ -362,8 +356,7 @@ sequences do legs or arms change sides.
 
 The weights hold two motion networks over one extractor and one skinning. "Standard" answers each frame at once:
 `stream` and, by default, Python's `System` use it. The other answers two frames (67 ms) later, and its filters know
-those frames: `retarget` uses it, unless `--online` is given. All its seeds have the extractor of seed 1, so the fair
-comparison is seed 1's, with 95 % intervals:
+those frames: `retarget` uses it, unless `--online` is given. With 95 % intervals:
 
 {late_differences}
 
@@ -371,7 +364,7 @@ Five frames are [no better than two](decisions.md#motion).
 
 ## Sure frames are better
 
-PA-MPJPE of the frames that the extractor is surest of (standard, seed 1). Here all frames
+PA-MPJPE of the frames that the extractor is surest of (standard). Here all frames
 count alike, in the tables above all sequences, so 100 % differs a little.
 
 {sure}
@@ -382,7 +375,7 @@ count alike, in the tables above all sequences, so 100 % differs a little.
   [speed](performance.md), [the papers' tables](reproduction.md),
   [fine-tuning](decisions.md#extractor).
 
-`restage sweep table experiments/studies/shipped` shows intervals. `sweep.yaml` there says how to run the sweep.
+`restage sweep table experiments/studies/standard` shows intervals. `sweep.yaml` there says how to run the sweep.
 """
 
 
@@ -390,11 +383,11 @@ def page():
     with_surface = [standard, late, no_motion, register]
     moving = [standard, late, no_motion, closed_form, unchanged]
     return TEMPLATE.format(
-        seed_count=len(standard.trials), lite_count=len(lite.trials), glance=glance(),
+        lite_count=len(lite.trials), glance=glance(), seeds_differ=seeds_differ(),
         joint_table=by_set(("pa_mpjpe", "mpjpe"), list(TOLD), True),
         surface_table=by_set(("pa_mpvd", "mpvd", "medl"), with_surface),
         calm_table=by_set(("acc", "foot_slide_mm"), moving), joints=joints(), real=real(),
-        late_count=len(late_trials), late_differences=late_differences(), kinds_table=kinds_table(), rotations=rotations(),
+        late_differences=late_differences(), kinds_table=kinds_table(), rotations=rotations(),
         same_for_all=same_for_all(), sure=sure())
 
 

@@ -12,12 +12,16 @@ namespace restage {
 /// the pelvis keeps its path. While the foot stands, the place moves towards where the network puts
 /// the foot, by a fiftieth of the distance in every frame. Once the foot is lifted, or the network
 /// puts the foot more than 6 cm away from the place, the distance shrinks by a quarter in every
-/// frame.
+/// frame. Upwards and downwards a foot is not held where it landed, but brought to where its sole
+/// belongs, by a quarter of the way in every frame.
 class FootLock {
  public:
   /// Changes `pose`, the network's, for the next frame. `rest`: rest joints of the body.
-  /// `standing`: the chances, 0 to 1, that the left and the right foot stand.
-  void operator()(const Joints& rest, const std::array<double, 2>& standing, Pose* pose);
+  /// `standing`: the chances, 0 to 1, that the left and the right foot stand. `above`: how far each
+  /// sole is above where it belongs, metres (infer/footing.h); without it a foot is held in its
+  /// height, too.
+  void operator()(const Joints& rest, const std::array<double, 2>& standing, Pose* pose,
+                  const std::optional<std::array<double, 2>>& above = {});
 
  private:
   struct Foot {

@@ -152,6 +152,7 @@ bool Retargeter::frame_by_frame() const { return options_.fps == kFps && motion_
 void Retargeter::forget() {
   state_ = {};
   feet_ = {};
+  if (footing_) footing_->forget();
   bones_ = {};
   waiting_ = {};
   heading_ = Heading(steady_heading_);
@@ -302,6 +303,7 @@ void Retargeter::begin(const SeenJoints& seen) {
     previous_.reset();
     back_before_.reset();
     feet_ = {};
+    if (footing_) footing_->forget();
     begun_ = grid_;
   }
   clear_start_ = clear;
@@ -339,12 +341,22 @@ void Retargeter::perform(const MotionOutput& answer, const Joints& a, const Mat3
   else
     root_b_ = path_ == Path::relative ? Vec3(start_b_ + t_b) : t_b;
   pose->root = root_b_;
-  if (!options_.foot_lock || !answer.standing.value.defined()) return;
+  if (answer.standing.value.defined()) stand(answer.standing.value.data<float>(), a, pose);
+}
+
+/// Puts B's feet on the floor and holds those that stand. `logits`: of the chances that the left
+/// and the right foot stand.
+void Retargeter::stand(const float* logits, const Joints& a, Pose* pose) {
   std::array<double, 2> standing{};
   for (size_t side = 0; side < 2; ++side)
-    standing[side] =
-        1 / (1 + std::exp(-static_cast<double>(answer.standing.value.data<float>()[side])));
-  feet_(rest_, standing, pose);
+    standing[side] = 1 / (1 + std::exp(-static_cast<double>(logits[side])));
+  if (options_.floor && !footing_ && rig() != nullptr)
+    footing_.emplace(Soles(target_, rig()->rest, rig()->weights));
+  const double scale = leg_length(rest_) / std::max(leg_length(a), 1e-6);
+  std::optional<std::array<double, 2>> above;
+  if (footing_) above = (*footing_)(rest_, a, scale, standing, pose);
+  if (options_.foot_lock) feet_(rest_, standing, pose, above);
+  if (footing_) footing_->keep_above(rest_, a, scale, pose);
 }
 
 /// Moves B's pelvis on by `velocity`, metres a second, and draws it to A's scaled path

@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "infer/foot_lock.h"
+#include "infer/footing.h"
 #include "infer/surface.h"
 #include "infer/system.h"
 #include "infer/waiting.h"
@@ -35,6 +36,9 @@ struct RetargetOptions {
   /// Hold feet that stand where they landed (infer/foot_lock.h), if the motion network says which
   /// feet stand.
   bool foot_lock = true;
+  /// The soles decide how high B stands, and no foot goes below the floor (infer/footing.h), if the
+  /// motion network says which feet stand and the target has a surface.
+  bool floor = false;
   /// Legs and arms that cross keep their names (keep_limbs(), nn/models/views.h).
   bool keep_limbs = true;
   /// People of any size are seen in an adult's (nn/models/extraction.h), targets too.
@@ -104,6 +108,7 @@ class Retargeter : public System {
   void begin(const SeenJoints& seen);
   MotionOutput ask(const SeenJoints& seen, const Mat3& turn);
   void perform(const MotionOutput& answer, const Joints& a, const Mat3& turn, Pose* pose);
+  void stand(const float* logits, const Joints& a, Pose* pose);
   void hold_doubtful(const Joints& a);
   void sum_path(const Joints& a, const Vec3& velocity);
 
@@ -122,6 +127,7 @@ class Retargeter : public System {
   Heading heading_{false};
   MotionState state_;
   FootLock feet_;
+  std::optional<Footing> footing_;
   SteadyBones bones_;
   Waiting waiting_;
   std::optional<Joints> previous_;      ///< A one frame of the grid ago

@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "datasets/importers/batches.h"
+#include "nn/geometry/soles.h"
 
 namespace restage {
 
@@ -18,16 +19,8 @@ std::vector<int32_t> outermost_vertices(const Body& body) {
     of_joint[joint].push_back(static_cast<int32_t>(v));
   }
   for (const std::vector<int32_t>& part : of_joint)
-    for (int code = 0; code < 27 && !part.empty(); ++code) {
-      const Point way(static_cast<float>(code % 3 - 1), static_cast<float>(code / 3 % 3 - 1),
-                      static_cast<float>(code / 9 - 1));
-      if (way.isZero()) continue;
-      out.push_back(*std::max_element(part.begin(), part.end(), [&](int32_t a, int32_t b) {
-        return way.dot(x[a]) < way.dot(x[b]);
-      }));
-    }
+    for (const int32_t vertex : outermost(x, part)) out.push_back(vertex);
   std::sort(out.begin(), out.end());
-  out.erase(std::unique(out.begin(), out.end()), out.end());
   return out;
 }
 

@@ -26,7 +26,8 @@ GltfClipWriter::GltfClipWriter(std::string out, const std::string& in,
 void GltfClipWriter::push(const Pose& pose, std::optional<double> confidence,
                           const FingerTurns* fingers) {
   const NodeTurns turns = rig_->turns(pose, fingers);
-  bool finite = turns.hips.allFinite();
+  bool finite = true;
+  for (const auto& [node, place] : turns.moved) finite = finite && place.allFinite();
   const size_t count = turns.local.size();
   for (size_t i = 0; i < count; ++i) {
     if (frames() == 0) nodes_.push_back(turns.local[i].first);
@@ -38,7 +39,10 @@ void GltfClipWriter::push(const Pose& pose, std::optional<double> confidence,
   if (!finite)
     throw WorkError(out_ + ": the pose of frame " + std::to_string(frames()) +
                     " is not finite; check the source and the weights");
-  for (int k = 0; k < 3; ++k) hips_.push_back(static_cast<float>(turns.hips[k]));
+  if (moves_.empty())
+    for (const auto& [node, place] : turns.moved) moves_.emplace_back(node, std::vector<float>());
+  for (size_t i = 0; i < moves_.size(); ++i)
+    for (const double x : turns.moved[i].second) moves_[i].second.push_back(static_cast<float>(x));
   if (confidence) confidence_.push_back(std::round(*confidence * 1e3) / 1e3);
 }
 
@@ -51,12 +55,12 @@ void GltfClipWriter::commit() {
     clip.name = options_.name;
     clip.fps = options_.fps;
     clip.frames = frames();
-    clip.hips = rig_->hips_node();
-    clip.places = hips_;
+    clip.moves = moves_;
     clip.confidence = confidence_;
     clip.filled = filled_;
     for (const GltfNode& node : rig_->file().nodes) {
-      if (node.number != clip.hips &&
+      const auto is_moved = [&](const auto& move) { return move.first == node.number; };
+      if (std::none_of(moves_.begin(), moves_.end(), is_moved) &&
           std::find(nodes_.begin(), nodes_.end(), node.number) == nodes_.end())
         continue;
       const Vec3 &t = node.translation, &s = node.scale;

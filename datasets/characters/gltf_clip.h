@@ -14,8 +14,8 @@ namespace restage {
 /// morph targets, extensions and earlier animations are the input's; of a GLB, the input's binary
 /// chunk begins the output's; but a node that is turned and whose place is a `matrix` gets
 /// translation, rotation and scale instead. The new animation turns the nodes of the 22 joints and
-/// of fingers (LINEAR, unit quaternions whose signs make curves continuous) and moves the hips,
-/// nothing else.
+/// of fingers (LINEAR, unit quaternions whose signs make curves continuous) and moves the hips and
+/// bones that hang elsewhere than on the body, nothing else.
 ///
 /// `out` ends in .glb, .vrm or .gltf. A .glb or .vrm holds everything itself, also what a .gltf
 /// names as files beside it. A .gltf keeps the names of such files; where it is written into
@@ -39,7 +39,7 @@ class GltfClipWriter {
   /// As GlbWriter::set_filled().
   void set_filled(std::vector<int64_t> frames) { filled_ = std::move(frames); }
   void commit();
-  size_t frames() const { return hips_.size() / 3; }
+  size_t frames() const { return moves_.empty() ? 0 : moves_[0].second.size() / 3; }
 
  private:
   std::string out_, in_, content_;
@@ -47,7 +47,7 @@ class GltfClipWriter {
   Options options_;
   std::vector<int> nodes_;                   ///< that are turned
   std::vector<std::array<float, 4>> turns_;  ///< one (x, y, z, w) a node, frame by frame
-  std::vector<float> hips_;                  ///< 3 numbers a frame
+  std::vector<std::pair<int, std::vector<float>>> moves_;  ///< nodes; 3 numbers a frame
   std::vector<double> confidence_;
   std::vector<int64_t> filled_;
 };

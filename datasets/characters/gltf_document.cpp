@@ -143,8 +143,8 @@ void GltfDocument::append(const Clip& clip) {
         {{"sampler", samplers.size()}, {"target", {{"node", node}, {"path", path}}}});
     samplers.push_back({{"input", input}, {"interpolation", "LINEAR"}, {"output", output}});
   };
-  channel(clip.hips, "translation",
-          accessor(clip.places.data(), clip.places.size(), "VEC3", clip.frames));
+  for (const auto& [node, places] : clip.moves)
+    channel(node, "translation", accessor(places.data(), places.size(), "VEC3", clip.frames));
   for (const auto& [node, turns] : clip.turns)
     channel(node, "rotation", accessor(turns.data(), 4 * turns.size(), "VEC4", clip.frames));
   Json animation = {{"name", clip.name}, {"channels", channels}, {"samplers", samplers}};
@@ -162,6 +162,190 @@ void GltfDocument::append(const Clip& clip) {
     s.json["buffers"][0]["byteLength"] = bytes.size();
   else
     s.list("buffers").push_back({{"byteLength", bytes.size()}});
+}
+
+namespace {
+
+/// What GlbWriter made: its document, and the bytes of its accessors.
+struct Worn {
+  Json json;
+  std::string binary;
+
+  Worn(const std::string& glb, const std::string& path) {
+    gltf::Chunks chunks = gltf::split_glb(glb, path);
+    json = Json::parse(chunks.json.begin(), chunks.json.end());
+    binary = std::string(chunks.binary);
+  }
+  std::string_view bytes(size_t accessor) const {
+    const Json& view = json["bufferViews"][json["accessors"][accessor]["bufferView"].get<size_t>()];
+    return std::string_view(binary).substr(view["byteOffset"].get<size_t>(),
+                                           view["byteLength"].get<size_t>());
+  }
+};
+
+bool stands_still(const GltfNode& node) {
+  return node.parent < 0 && node.translation.isZero(0) && node.scale == Vec3::Ones() &&
+         node.rotation.coeffs() == Quat::Identity().coeffs();
+}
+
+}  // namespace
+
+/// Puts parts of another document into this one.
+class GltfDocument::Tailor {
+ public:
+  Tailor(State& state, const Worn& worn, const Gltf& file)
+      : s_(state), worn_(worn), file_(file), rest_(gltf_rest(file)) {
+    if (s_.has_binary) pad(s_.binary);
+    buffer_ = s_.has_binary ? 0 : s_.list("buffers").size();
+    first_node_ = s_.list("nodes").size();
+  }
+
+  void sew() {
+    add_bones();
+    std::map<int, std::vector<GltfPart>> of_node;
+    for (const GltfPart& part : file_.parts) of_node[part.node].push_back(part);
+    std::map<size_t, int> wearers;  // of a mesh
+    for (const auto& [node, parts] : of_node) dress(node, parts, wearers);
+    add_animation();
+    for (const auto& [key, value] : worn_.json["asset"]["extras"].items())
+      s_.json["asset"]["extras"][key] = value;
+    if (s_.has_binary)
+      s_.json["buffers"][0]["byteLength"] = s_.binary.size();
+    else
+      s_.list("buffers").push_back({{"byteLength", s_.added.size()}});
+  }
+
+ private:
+  /// A view of its own, since the format wants one for each attribute of vertices.
+  size_t add(std::string_view bytes, Json accessor, int target) {
+    std::string& all = s_.has_binary ? s_.binary : s_.added;
+    const size_t at = State::put(all, bytes.data(), bytes.size());
+    Json view = {{"buffer", buffer_}, {"byteOffset", at}, {"byteLength", bytes.size()}};
+    if (target != 0) view["target"] = target;
+    s_.list("bufferViews").push_back(view);
+    accessor["bufferView"] = s_.json["bufferViews"].size() - 1;
+    s_.list("accessors").push_back(std::move(accessor));
+    return s_.json["accessors"].size() - 1;
+  }
+  size_t copy(size_t accessor) {
+    return add(worn_.bytes(accessor), worn_.json["accessors"][accessor], 0);
+  }
+  /// Some rows of an attribute.
+  size_t rows(size_t accessor, size_t first, size_t count) {
+    constexpr int kVertices = 34962;
+    const std::string_view all = worn_.bytes(accessor);
+    Json one = worn_.json["accessors"][accessor];
+    const size_t width = all.size() / one["count"].get<size_t>();
+    one["count"] = count;
+    return add(all.substr(first * width, count * width), std::move(one), kVertices);
+  }
+
+  Json& scene() {
+    if (s_.list("scenes").empty()) gltf::broken(s_.path, "has no scene");
+    return s_.json["scenes"].at(s_.json.value("scene", size_t{0}));
+  }
+
+  void add_bones() {
+    const Json& nodes = worn_.json["nodes"];
+    for (size_t n = 0; n + 1 < nodes.size(); ++n) {  // the last is the mesh's
+      Json node = nodes[n];
+      if (node.contains("children"))
+        for (Json& child : node["children"]) child = child.get<size_t>() + first_node_;
+      s_.json["nodes"].push_back(std::move(node));
+    }
+    scene()["nodes"].push_back(worn_.json["skins"][0]["skeleton"].get<size_t>() + first_node_);
+  }
+
+  /// The skin of a node: bones, seen from the space in which its vertices are stored.
+  size_t skin_of(const GltfNode& node, size_t place) {
+    if (stands_still(node) && plain_skin_) return *plain_skin_;
+    Json skin = worn_.json["skins"][0];
+    const size_t accessor = skin["inverseBindMatrices"].get<size_t>();
+    std::string bytes(worn_.bytes(accessor));
+    for (size_t at = 0; at < bytes.size(); at += 64) {
+      Eigen::Matrix4f m;
+      std::memcpy(m.data(), &bytes[at], 64);
+      m = (m.cast<double>() * rest_[place].matrix()).cast<float>();
+      m.row(3) << 0, 0, 0, 1;
+      std::memcpy(&bytes[at], m.data(), 64);
+    }
+    skin["inverseBindMatrices"] = add(bytes, worn_.json["accessors"][accessor], 0);
+    skin["skeleton"] = skin["skeleton"].get<size_t>() + first_node_;
+    for (Json& joint : skin["joints"]) joint = joint.get<size_t>() + first_node_;
+    s_.list("skins").push_back(std::move(skin));
+    const size_t out = s_.json["skins"].size() - 1;
+    if (stands_still(node)) plain_skin_ = out;
+    return out;
+  }
+
+  void dress(int number, const std::vector<GltfPart>& parts, std::map<size_t, int>& wearers) {
+    const auto place = static_cast<size_t>(
+        std::find_if(file_.nodes.begin(), file_.nodes.end(),
+                     [&](const GltfNode& node) { return node.number == number; }) -
+        file_.nodes.begin());
+    auto mesh = s_.json["nodes"].at(static_cast<size_t>(number)).at("mesh").get<size_t>();
+    if (wearers[mesh]++ > 0) {  // shown twice: each has weights of its own
+      s_.json["meshes"].push_back(Json(s_.json["meshes"].at(mesh)));
+      mesh = s_.json["meshes"].size() - 1;
+    }
+    const Json& ours = worn_.json["meshes"][0]["primitives"][0]["attributes"];
+    for (const GltfPart& part : parts) {
+      Json& attributes =
+          s_.json["meshes"].at(mesh).at("primitives").at(part.primitive)["attributes"];
+      for (const char* name : {"JOINTS_0", "WEIGHTS_0"})
+        attributes[name] = rows(ours[name].get<size_t>(), part.first, part.count);
+    }
+    const size_t skin = skin_of(file_.nodes[place], place);
+    size_t wearer = static_cast<size_t>(number);
+    if (!stands_still(file_.nodes[place])) wearer = own_node(wearer);
+    s_.json["nodes"][wearer]["mesh"] = mesh;
+    s_.json["nodes"][wearer]["skin"] = skin;
+  }
+
+  /// A node at the top of the scene that shows what `number` showed.
+  size_t own_node(size_t number) {
+    Json node = Json::object();
+    const size_t out = s_.json["nodes"].size();
+    Json& from = s_.json["nodes"][number];
+    if (from.contains("name")) node["name"] = from["name"];
+    from.erase("mesh");
+    if (from.contains("weights")) node["weights"] = from["weights"], from.erase("weights");
+    s_.json["nodes"].push_back(std::move(node));
+    scene()["nodes"].push_back(out);
+    for (Json& animation : s_.list("animations"))
+      for (Json& channel : animation["channels"])
+        if (Json& target = channel["target"];
+            target.value("path", "") == "weights" && target.value("node", size_t{0}) == number)
+          target["node"] = out;
+    if (s_.json["animations"].empty()) s_.json.erase("animations");
+    return out;
+  }
+
+  void add_animation() {
+    if (!worn_.json.contains("animations")) return;
+    Json animation = worn_.json["animations"][0];
+    std::map<size_t, size_t> copied;
+    for (Json& sampler : animation["samplers"])
+      for (const char* end : {"input", "output"}) {
+        const auto accessor = sampler[end].get<size_t>();
+        if (copied.count(accessor) == 0) copied[accessor] = copy(accessor);
+        sampler[end] = copied[accessor];
+      }
+    for (Json& channel : animation["channels"])
+      channel["target"]["node"] = channel["target"]["node"].get<size_t>() + first_node_;
+    s_.list("animations").push_back(std::move(animation));
+  }
+
+  State& s_;
+  const Worn& worn_;
+  const Gltf& file_;
+  const GltfTransforms rest_;
+  size_t buffer_ = 0, first_node_ = 0;
+  std::optional<size_t> plain_skin_;
+};
+
+void GltfDocument::wear(const std::string& glb, const Gltf& file) {
+  checked_kinds(state_->path, [&] { Tailor(*state_, Worn(glb, state_->path), file).sew(); });
 }
 
 void GltfDocument::keep_nodes_only() {

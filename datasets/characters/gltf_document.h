@@ -10,6 +10,8 @@
 #include <utility>
 #include <vector>
 
+#include "datasets/readers/gltf/gltf.h"
+
 namespace restage {
 
 class GltfDocument {
@@ -27,12 +29,17 @@ class GltfDocument {
     /// Of all nodes that are turned or moved: translation, rotation (x, y, z, w) and scale, in the
     /// place of a `matrix`, which the format does not let an animation turn.
     std::map<int, std::array<double, 10>> rest;
-    int hips;                   ///< number of the node that is moved
-    std::vector<float> places;  ///< its translation, 3 numbers a frame
+    /// Numbers of the nodes that are moved, and their translations, 3 numbers a frame.
+    std::vector<std::pair<int, std::vector<float>>> moves;
     std::vector<double> confidence;
     std::vector<int64_t> filled;
   };
   void append(const Clip& clip);
+  /// Gives the meshes of a file without skins the skeleton, the skin and the animation of `glb`,
+  /// which GlbWriter has made for gltf_mesh(file, gltf_rest(file)); `file`: parse_gltf() of this
+  /// document. Everything else stays as it is: pictures, materials, texture coordinates, the order
+  /// of vertices. A mesh whose node is moved goes to a node of its own, since a skin ignores that.
+  void wear(const std::string& glb, const Gltf& file);
   /// Drops everything but nodes and scenes; nodes show nothing any more.
   void keep_nodes_only();
 
@@ -43,6 +50,7 @@ class GltfDocument {
 
  private:
   struct State;
+  class Tailor;
   std::unique_ptr<State> state_;
 };
 

@@ -237,7 +237,7 @@ std::string GlbWriter::bytes() const {
 
 InfluenceError GlbWriter::commit() {
   write_file_atomically(path_, bytes());
-  return cut_error_.summary();
+  return influence_error();
 }
 
 }  // namespace restage

@@ -57,8 +57,11 @@ class GlbWriter {
   /// The numbers of the frames that have no cloud of the source behind them
   /// (RetargetedFrame::filled). The file holds the numbers in the animation's extras.
   void set_filled(std::vector<int64_t> frames) { filled_ = std::move(frames); }
-  /// Writes the file. Its `asset.extras` say fps, units and the influence error in millimetres.
+  /// The file. Its `asset.extras` say fps, units and the influence error in millimetres.
+  std::string bytes() const;
+  /// Writes it.
   InfluenceError commit();
+  InfluenceError influence_error() const { return cut_error_.summary(); }
   /// Between the file's surface and the exact ones that push() was given; zeros: none.
   DistanceSummary surface_error() const { return surface_error_.summary(); }
   size_t frames() const { return tracks_.frames(); }
@@ -66,7 +69,6 @@ class GlbWriter {
  private:
   void measure_cut(const PosedSkeleton& posed);
   void measure_surface(const PosedSkeleton& posed, const Points& surface);
-  std::string bytes() const;
 
   std::string path_;
   Mesh mesh_;

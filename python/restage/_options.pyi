@@ -32,6 +32,7 @@ class RetargetOptions(TypedDict, total=False):
     anchor: float | None  # seconds in which the path goes back to the source's, scaled to the target's legs (0: never) (default: 0.25)
     min_confidence: float | None  # the target waits where the extractor is less sure than this, 0 to 1 (0: never), and comes back within half a second (default: 0)
     foot_lock: bool  # False: feet that stand are not held where they landed
+    floor: Literal["on", "off"] | None  # on: soles stand on the floor, and no foot goes below it; off (default: on, but for X.h5 of a target without bones)
     keep_limbs: bool  # False: legs and arms that cross are named as each frame shows them
     steady_bones: bool  # False: the source's bones are as long as each frame shows them
     online: bool  # every frame is answered at once, as in 'restage stream'; else weights that can look two frames ahead do so
@@ -51,6 +52,7 @@ class SystemOptions(TypedDict, total=False):
     anchor: float | None  # seconds in which the path goes back to the source's, scaled to the target's legs (0: never) (default: 0.25)
     min_confidence: float | None  # the target waits where the extractor is less sure than this, 0 to 1 (0: never), and comes back within half a second (default: 0)
     foot_lock: bool  # False: feet that stand are not held where they landed
+    floor: Literal["on", "off"] | None  # on: soles stand on the floor, and no foot goes below it; off (default: on, but for X.h5 of a target without bones)
     keep_limbs: bool  # False: legs and arms that cross are named as each frame shows them
     steady_bones: bool  # False: the source's bones are as long as each frame shows them
     online: bool  # False: weights that can look two frames ahead do so

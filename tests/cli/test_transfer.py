@@ -61,7 +61,7 @@ class Transfer(CliTest):
         self.bad_input(call + ["--out", "x.h5"], "x.h5", "end --out in /")
         self.bad_input(call + ["--out", "x/", "--fps", "60"], "60 frames a second")
         for option in (["--samples", "8"], ["--min-confidence", "0.5"], ["--anchor", "1"], ["--no-foot-lock"], ["--no-keep-limbs"], ["--no-steady-bones"],
-                       ["--rest", "hero.ply"]):
+                       ["--rest", "hero.ply"], ["--floor", "on"]):
             self.bad_input(call + ["--out", "x/", *option], option[0] + " says nothing to --system transfer")
         self.bad_input(["retarget", "--force", "--source", "scans", "--target", "hero.ply", "--weights", weights, "--out", "x/"], "no model for skeleton")
 

@@ -40,8 +40,8 @@ class Characters : public FileTest {
 
   /// The motion of known_ in the file of a character.
   std::string performed(const std::string& in, const std::string& out,
-                        GltfClipWriter::Options options = {}) const {
-    const TargetMesh target = read_target(in);
+                        GltfClipWriter::Options options = {}, const std::string& bones = "") const {
+    const TargetMesh target = read_target(in, bones);
     EXPECT_TRUE(target.own) << target.unknown_rig;
     GltfClipWriter writer(out, in, target.own, std::move(options));
     for (size_t f = 0; f < kFrames; ++f) writer.push(pose(f), 0.5);
@@ -52,8 +52,9 @@ class Characters : public FileTest {
 
   /// What a program that plays the new animation shows is what place() says, and its joints turn as
   /// the poses do.
-  void expect_played(const std::string& in, const std::string& out) const {
-    const TargetMesh target = read_target(in);
+  void expect_played(const std::string& in, const std::string& out,
+                     const std::string& bones = "") const {
+    const TargetMesh target = read_target(in, bones);
     const Gltf file = read_gltf(out);
     const GltfClip& clip = find_clip(file, "retargeted");
     ASSERT_EQ(clip_frames(file, clip), int64_t{kFrames});
@@ -104,6 +105,57 @@ TEST_F(Characters, PlayTheMotionOnTheirOwnBones) {
     const std::string in = write("in.vrm", testing::vrm_parts(known_, list));
     expect_played(in, performed(in, dir / "out.vrm"));
   }
+}
+
+/// As exports with IK have them: goals on the armature. No bone is left behind.
+TEST_F(Characters, BonesThatHangElsewhereGoWithTheBody) {
+  RigStyle goals = testing::mixamo_style();
+  goals.arms_down = 40;
+  goals.hung = {{7, -1}, {8, -1}, {20, -1}, {21, -1}};
+  RigStyle beside = testing::plain_style();
+  beside.hung = {{4, 0}, {5, 0}};  // shins on the pelvis
+  for (const RigStyle& style : {goals, beside}) {
+    const std::string in = write("in.glb", CharacterMaker(known_, style).parts);
+    const std::string bones = dir.write("names.yaml", testing::bones_yaml(style));
+    EXPECT_TRUE(read_target(in, bones).own);
+    if (!style.hung.count(4)) EXPECT_TRUE(read_target(in).own) << read_target(in).unknown_rig;
+    expect_played(in, performed(in, dir / "out.glb", {}, bones), bones);
+  }
+}
+
+TEST_F(Characters, ATrunkBesideItsLegsIsMovedByWhatCarriesBoth) {
+  // Root carries the thighs and Hips, Hips the spine alone.
+  RigStyle style = testing::plain_style();
+  style.names[0] = "Root";
+  style.names[3] = "Hips";
+  style.names[6] = "Abdomen";
+  style.names[9] = "Chest";
+  const std::string in = write("in.glb", CharacterMaker(known_, style).parts);
+  expect_played(in, performed(in, dir / "out.glb"));
+}
+
+TEST_F(Characters, RigidPartsAreDrivenByTheirNodes) {
+  RigStyle style = testing::mixamo_style();
+  style.rigid = true;
+  const std::string in = write("in.glb", CharacterMaker(known_, style).parts);
+  expect_played(in, performed(in, dir / "out.glb"));
+}
+
+TEST_F(Characters, WhatWouldBeTornIsRefused) {
+  RigStyle style = testing::mixamo_style();
+  style.hung = {
+      {12, 3}};  // trunks are built in many ways: the neck goes with the first of the spine
+  const std::string in = write("in.glb", CharacterMaker(known_, style).parts);
+  const TargetMesh target = read_target(in, dir.write("names.yaml", testing::bones_yaml(style)));
+  ASSERT_TRUE(target.own);
+  Joints joints;
+  Pose bent = pose(0);
+  for (const int j : {6, 9})
+    bent.local[j] = Eigen::AngleAxisd(0.1, Vec3::UnitX()).toRotationMatrix();
+  target.own->place(bent, nullptr, &joints, nullptr);
+  for (const int j : {6, 9})
+    bent.local[j] = Eigen::AngleAxisd(1.5, Vec3::UnitX()).toRotationMatrix();
+  EXPECT_THROW(target.own->place(bent, nullptr, &joints, nullptr), InputError);
 }
 
 TEST_F(Characters, AllElseIsWhatItWas) {

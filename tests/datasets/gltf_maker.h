@@ -65,11 +65,24 @@ struct RigStyle {
   double fps = 60;
   size_t keys = 61;
   bool nodes_rest_posed = false;  ///< nodes rest in the first frame of the motion
+  /// Bones that hang on another bone than the body's; -1: on the armature.
+  std::map<int, int> hung = {};
+  bool rigid = false;  ///< every box is a mesh of its own on its bone, without a skin
+
+  int parent_of(int j) const { return hung.count(j) != 0 ? hung.at(j) : kParents[j]; }
 };
 
 inline RigStyle plain_style() {
   RigStyle out;
   for (int j = 0; j < kJoints; ++j) out.names[j] = kJointNames[j];
+  return out;
+}
+
+/// The file that says which bone is which joint.
+inline std::string bones_yaml(const RigStyle& style) {
+  std::string out = "title: Mine\njoints:\n";
+  for (int j = 0; j < kJoints; ++j)
+    out += "  " + std::string(kJointNames[j]) + ": \"" + style.names[j] + "\"\n";
   return out;
 }
 
@@ -134,7 +147,7 @@ class CharacterMaker {
       : known_(known), style_(style) {
     bind_ = place(forward_kinematics(known.body.joints, rest_pose()));
     add_nodes();
-    add_mesh();
+    style.rigid ? add_parts() : add_mesh();
     add_motion("walk");
   }
   GlbParts parts;
@@ -142,6 +155,7 @@ class CharacterMaker {
   void add_motion(const std::string& name) {
     std::vector<float> times, roots;
     std::array<std::vector<float>, kJoints> turns;
+    std::map<int, std::vector<float>> places;  // of bones that hang elsewhere
     for (size_t k = 0; k < style_.keys; ++k) {
       const double t = static_cast<double>(k) / style_.fps;
       times.push_back(static_cast<float>(t));
@@ -151,6 +165,9 @@ class CharacterMaker {
         const Quat q(local.rotation());
         for (const double x : {q.x(), q.y(), q.z(), q.w()})
           turns[j].push_back(static_cast<float>(x));
+        if (style_.hung.count(j) != 0)
+          for (int c = 0; c < 3; ++c)
+            places[j].push_back(static_cast<float>(local.translation()[c]));
         if (j > 0) continue;
         for (int c = 0; c < 3; ++c) roots.push_back(static_cast<float>(local.translation()[c]));
       }
@@ -163,6 +180,7 @@ class CharacterMaker {
       animation["samplers"].push_back({{"input", input}, {"output", output}});
     };
     channel(0, "translation", parts.floats(roots, "VEC3", 3));
+    for (const auto& [j, moved] : places) channel(j, "translation", parts.floats(moved, "VEC3", 3));
     for (int j = 0; j < kJoints; ++j) channel(j, "rotation", parts.floats(turns[j], "VEC4", 4));
     parts.root["animations"].push_back(animation);
   }
@@ -188,7 +206,8 @@ class CharacterMaker {
     return std::cbrt(style_.world.linear().determinant() / style_.armature.linear().determinant());
   }
   Eigen::Affine3d local_of(const World& world, int j) const {
-    return (kParents[j] < 0 ? style_.armature : world[kParents[j]]).inverse() * world[j];
+    const int parent = style_.parent_of(j);
+    return (parent < 0 ? style_.armature : world[parent]).inverse() * world[j];
   }
   static GltfJson trs(const std::string& name, const Eigen::Affine3d& local) {
     const double scale = std::cbrt(local.linear().determinant());
@@ -218,7 +237,10 @@ class CharacterMaker {
         twist_[j] = static_cast<int>(joints_.size());
         joints_.push_back(node);
       }
-    for (int j = 1; j < kJoints; ++j) parts.root["nodes"][kParents[j]]["children"].push_back(j);
+    for (int j = 1; j < kJoints; ++j) {
+      const int parent = style_.parent_of(j);
+      parts.root["nodes"][parent < 0 ? 22 : parent]["children"].push_back(j);
+    }
     parts.root["scene"] = 0;
     parts.root["scenes"] = {{{"nodes", {22}}}};
   }
@@ -258,6 +280,36 @@ class CharacterMaker {
     }
     parts.root["skins"] = {
         {{"joints", joints_}, {"inverseBindMatrices", parts.floats(inverse, "MAT4", 16)}}};
+  }
+
+  /// A mesh for each bone that has vertices, in the bone's space.
+  void add_parts() {
+    const Body& body = known_.body;
+    const Points posed = linear_blend_skinning(body, rest_pose());
+    for (int j = 0; j < kJoints; ++j) {
+      std::vector<float> positions;
+      std::vector<uint32_t> index;
+      std::map<int32_t, uint32_t> place;
+      for (const Triangle& f : body.rest.faces) {
+        if (body.weights(f[0], j) == 0) continue;
+        for (const int32_t v : f) {
+          if (place.emplace(v, place.size()).second)
+            for (const double x :
+                 Vec3(bind_[j].inverse() *
+                      (style_.world * posed[static_cast<size_t>(v)].cast<double>())))
+              positions.push_back(static_cast<float>(x));
+          index.push_back(place.at(v));
+        }
+      }
+      if (index.empty()) continue;
+      GltfJson primitive;
+      primitive["attributes"]["POSITION"] = parts.floats(positions, "VEC3", 3);
+      primitive["indices"] = parts.add(index, 5125, "SCALAR", 1);
+      parts.root["nodes"][j]["mesh"] = parts.root["meshes"].size();
+      parts.root["meshes"].push_back({{"primitives", {primitive}}});
+    }
+    parts.root["nodes"][23].erase("mesh");
+    parts.root["nodes"][23].erase("skin");
   }
 
   const KnownCharacter& known_;

@@ -118,7 +118,8 @@ class Finder {
 
   FoundLimb weighed(FoundLimb limb) const {
     limb.cost = words_[limb.upper].cost + words_[limb.lower].cost + words_[limb.end].cost;
-    for (int b = parent(limb.end); b != limb.upper; b = parent(b))
+    const int last = hangs_on(skeleton_, limb.end, limb.lower) ? limb.end : limb.lower;
+    for (int b = parent(last); b != limb.upper; b = parent(b))
       if (words_[b].part == BonePart::none && !words_[b].helper) limb.stranger = b;
     return limb;
   }
@@ -186,6 +187,47 @@ class Finder {
     return weighed(out);
   }
 
+  /// A limb whose end hangs elsewhere, as the goal of its maker's IK: `end` is the only one of its
+  /// name that no limb has, the lower bone carries none, and the end is as far from the lower bone
+  /// as a person's.
+  FoundLimb limb_apart(int side, const LimbWords& limb) const {
+    FoundLimb out;
+    out.lacks = 3;
+    const auto only = [&](const auto& fits) {
+      int found = -1;
+      for (int b = 0; b < size(); ++b)
+        if (may_be(b, side) && inside(b) && fits(b)) {
+          if (found >= 0 && hangs_on(skeleton_, b, found)) continue;  // a mesh on its bone
+          if (found >= 0) return -2;
+          found = b;
+        }
+      return found;
+    };
+    const int called = only([&](int b) { return words_[b].part == limb.lower; });
+    const int strong = only([&](int b) { return words_[b].part == limb.upper; });
+    const int lower = called != -1 || strong < 0 ? called : only([&](int b) {
+      return words_[b].part == limb.either && hangs_on(skeleton_, b, strong);
+    });
+    if (lower < 0) return out;
+    int end = -1;
+    for (const BonePart part : limb.ends)
+      if (end == -1) end = only([&](int b) { return words_[b].part == part; });
+    if (end < 0 || hangs_on(skeleton_, end, lower)) return out;
+    FoundLimb found;
+    const std::vector<int> rest = above(path_to(lower, side), lower);
+    found.lower = lower;
+    found.end = end;
+    found.upper = plainest(rest, limb.upper, limb.either);
+    if (found.upper < 0 || hangs_on(skeleton_, end, found.upper)) return out;
+    constexpr double kMost = 2;
+    const double upper_length = (place(found.upper) - place(lower)).norm(),
+                 lower_length = (place(lower) - place(end)).norm();
+    if (std::max(upper_length, lower_length) > kMost * std::min(upper_length, lower_length))
+      return out;
+    found.root = plainest(above(rest, found.upper), BonePart::collar, BonePart::shoulder);
+    return weighed(found);
+  }
+
   bool may_end(int b, int side, const LimbWords& limb) const {
     if (words_[b].side != side || !inside(b)) return false;
     return words_[b].helper ? words_[b].end && words_[b].part == limb.either
@@ -212,7 +254,9 @@ class Finder {
         ambiguous |= limb.upper != best->upper || limb.lower != best->lower;
       }
     }
-    return best.value_or(broken);
+    if (best) return *best;
+    const FoundLimb apart = limb_apart(side, words);
+    return apart.lacks == 0 ? apart : broken;
   }
 
   FoundLimb take_limb(int side, const LimbWords& words) {
@@ -336,10 +380,21 @@ class Finder {
     int beside = -1, count = 0;
     for (int b = all + 1; b < size(); ++b)
       if (parent(b) == all && named(b)) beside = b, ++count;
-    if (count == 1 && words_[all].part == BonePart::none) return beside;
+    if (count == 1 && words_[all].part == BonePart::none)
+      return is_among_hips(all) && hangs_on(skeleton_, chest_of(tree_, out_.bones), beside)
+                 ? all
+                 : beside;
     const bool carries = legs != all && words_[all].part == BonePart::none &&
                          words_[legs].side == BoneWords::middle && !words_[legs].helper;
     return carries ? legs : all;
+  }
+
+  /// Whether a bone that carries legs and chest lies where a pelvis does.
+  bool is_among_hips(int all) const {
+    constexpr double kNear = 0.4;  // of a leg
+    const Vec3 hips = 0.5 * (place(out_.bones[1]) + place(out_.bones[2]));
+    const double leg = length(1, 4) + length(4, 7);
+    return (place(all) - hips).norm() < kNear * leg;
   }
 
   /// From below `under` up to the chest.
@@ -459,12 +514,8 @@ class Finder {
     for (int b = bone; b >= 0; b = parent(b)) out += skeleton_.offsets[b];
     return out;
   }
-  /// From a bone to one that hangs on it, in the zero pose.
-  Vec3 between(int from, int to) const {
-    Vec3 out = Vec3::Zero();
-    for (int b = to; b != from; b = parent(b)) out += skeleton_.offsets[b];
-    return out;
-  }
+  /// From a bone to another, in the zero pose.
+  Vec3 between(int from, int to) const { return place(to) - place(from); }
   double length(int from, int to) const { return between(out_.bones[from], out_.bones[to]).norm(); }
 
   /// A limb with a part many times as long as its other part, or as the other side's, was not

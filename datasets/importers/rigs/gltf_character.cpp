@@ -19,8 +19,7 @@ std::string id_of(const std::string& path, const MotionOptions& options) {
 
 void describe(const Gltf& file, ImportReport& report) {
   report.file = file.path;
-  size_t joints = 0;
-  for (const GltfBone& bone : file.bones) joints += bone.skin >= 0;
+  const size_t joints = skin_joints(file);
   report.fact("holds", cat(file.standard, file.standard.empty() ? "" : ", ",
                            counted(file.meshes, "mesh", "meshes"), " of ", file.vertices.size(),
                            " vertices and ", file.faces.size(), " triangles, ",
@@ -119,7 +118,29 @@ std::vector<Motion> motions_of(const Gltf& file, const GltfRig& rig, const Motio
                    "export again; as a rigid {target} it will do");
 }
 
+/// Nodes whose meshes move with them as they are, without a skin.
+std::vector<int> rigid_parts(const Gltf& file) {
+  std::set<int> out;
+  for (const GltfInfluence& by : file.influences)
+    if (const GltfBone& bone = file.bones[by.bone]; bone.skin < 0) out.insert(bone.node);
+  return {out.begin(), out.end()};
+}
+
+std::string words_of(const Gltf& file, const std::vector<int>& parts) {
+  constexpr size_t kLongList = 80;  // bytes
+  std::vector<std::string> names;
+  for (const int n : parts) names.push_back(text::quote(file.nodes[static_cast<size_t>(n)].name));
+  return cat(parts.size(), " rigid parts (", cut_list(names, kLongList), ")");
+}
+
 }  // namespace
+
+size_t skin_joints(const Gltf& file) {
+  std::set<int> out;
+  for (const GltfBone& bone : file.bones)
+    if (bone.skin >= 0) out.insert(bone.node);
+  return out.size();
+}
 
 bool moves_joints(const Gltf& file, const GltfRig& rig, const GltfClip& clip) {
   std::vector<bool> counts(file.nodes.size());
@@ -197,7 +218,8 @@ TargetMesh read_target(const std::string& path, const std::string& bones) {
     file = read_gltf(path);
     describe(file, out.report);
   }
-  if (file.skin_nodes.empty() && !bones.empty())
+  const std::vector<int> parts = rigid_parts(file);
+  if (file.skin_nodes.empty() && parts.size() < 2 && !bones.empty())
     throw InputError(path, "has no rig whose bones could be named", "leave {bones} out");
   if (!is_gltf_name(path)) {
     out.mesh = read_mesh(path);
@@ -208,9 +230,16 @@ TargetMesh read_target(const std::string& path, const std::string& bones) {
   options.profile = bones;
   GltfRig rig;
   try {
-    if (out.rigged) rig = find_rig(file, options, out.report);
+    if (out.rigged || parts.size() > 1) {
+      rig = find_rig(file, options, out.report);
+      out.rigged = true;
+    }
   } catch (const UnknownSkeleton& error) {
-    out.unknown_rig = error.reason;
+    if (!bones.empty()) throw;
+    if (out.rigged)
+      out.unknown_rig = error.reason;
+    else
+      out.parts = words_of(file, parts);
   }
   if (!out.rigged || !out.unknown_rig.empty()) {
     out.report.remark(!out.rigged

@@ -46,9 +46,13 @@ struct TargetMesh {
   std::shared_ptr<const GltfOwnRig> own;  ///< of a known rig: it poses the mesh itself
   bool rigged = false;                    ///< it has a rig, known or not
   std::string unknown_rig;  ///< why the joints of a rig were not found; empty: they were
+  std::string parts;  ///< of a file without skin and bones, which meshes it is made of; else empty
   /// What the doctor need not guess of it.
   ExamineOptions known() const;
 };
+
+/// How many nodes are joints of skins; one of several skins counts once.
+size_t skin_joints(const Gltf& file);
 
 /// What `restage retarget --target` takes: of a glTF character the surface in T-pose, in metres, y
 /// up, facing +z, with all vertices and faces in the file's order; a glTF file without a known rig

@@ -2,6 +2,10 @@
 
 #include <algorithm>
 
+#include "autograd/base/format.h"
+#include "datasets/readers/errors.h"
+#include "datasets/readers/text/text.h"
+
 namespace restage {
 
 FingerBones rig_fingers(const Gltf& file, const GltfRig& rig) {
@@ -62,7 +66,8 @@ GltfTransforms GltfOwnRig::world(const Pose* pose, const FingerTurns* fingers,
   global.fill(Mat3::Identity());
   if (pose != nullptr) global = to_global(pose->local);
   GltfTransforms out(file_.nodes.size());
-  for (size_t n = 0; n < out.size(); ++n) {
+  for (const int at : rig_.order) {
+    const auto n = static_cast<size_t>(at);
     const GltfNode& node = file_.nodes[n];
     const Eigen::Affine3d parent =
         node.parent < 0 ? Eigen::Affine3d::Identity() : out[static_cast<size_t>(node.parent)];
@@ -73,13 +78,44 @@ GltfTransforms GltfOwnRig::world(const Pose* pose, const FingerTurns* fingers,
       moved.rotation = Quat(rotation_of(parent.linear()).transpose() * wanted).normalized();
       if (turns != nullptr) turns->local.emplace_back(node.number, moved.rotation);
     }
-    if (pose != nullptr && static_cast<int>(n) == rig_.hips) {
+    const bool hips = pose != nullptr && at == rig_.hips, loose = rig_.carrier[n] != node.parent;
+    if (hips)
       moved.translation = parent.inverse() * Vec3(rig_.turn.transpose() * pose->root / rig_.scale);
-      if (turns != nullptr) turns->hips = moved.translation;
-    }
+    else if (loose)
+      moved.translation = parent.inverse() * carried(out, n);
+    if (turns != nullptr && (hips || loose))
+      turns->moved.emplace_back(node.number, moved.translation);
     out[n] = parent * moved.local();
   }
   return out;
+}
+
+/// Where the node's carrier takes it.
+Vec3 GltfOwnRig::carried(const GltfTransforms& world, size_t node) const {
+  const auto c = static_cast<size_t>(rig_.carrier[node]);
+  const Eigen::Affine3d &rest = rig_.t_pose[c], &now = world[c];
+  const Vec3 apart = rig_.t_pose[node].translation() - rest.translation();
+  return now.translation() + now.linear() * rest.linear().inverse() * apart;
+}
+
+/// Rotations keep bones together, whatever they are. So a bone that leaves its neighbour hangs
+/// elsewhere than it seemed, and the figure would be torn.
+void GltfOwnRig::check_joined(const Joints& joints) const {
+  constexpr double kTorn = 0.03;  // of the distance from the floor to the head
+  for (size_t j = 1; j < kJoints; ++j) {
+    auto p = static_cast<size_t>(kParents[j]);
+    while (p > 0 && !rig_.offset[p].isZero()) p = static_cast<size_t>(kParents[p]);
+    if (!rig_.offset[j].isZero() || !rig_.offset[p].isZero()) continue;
+    const double rest = (rest_[j] - rest_[p]).norm(), now = (joints[j] - joints[p]).norm();
+    if (std::abs(now - rest) < kTorn * rest_[kHead].y()) continue;
+    const auto name = [&](size_t k) {
+      return text::quote(file_.nodes[static_cast<size_t>(rig_.node[k])].name);
+    };
+    throw InputError(file_.path,
+                     cat("bone ", name(j), " (", kJointNames[j], ") would leave ", name(p), " (",
+                         kJointNames[p], "): ", format("%.2f m become %.2f", rest, now)),
+                     "say which bone is which joint with {bones} names.yaml (docs/formats.md)");
+  }
 }
 
 Vec3 GltfOwnRig::joint_at(const GltfTransforms& world, size_t j) const {
@@ -92,6 +128,7 @@ void GltfOwnRig::place(const Pose& pose, const FingerTurns* fingers, Joints* joi
                        Points* vertices) const {
   const GltfTransforms nodes = world(&pose, fingers);
   for (size_t j = 0; j < kJoints; ++j) (*joints)[j] = joint_at(nodes, j);
+  check_joined(*joints);
   if (vertices == nullptr) return;
   *vertices = gltf_mesh(file_, nodes).vertices;
   for (Point& p : *vertices) p = rig_.to_ours(p.cast<double>()).cast<float>();

@@ -21,12 +21,15 @@ FingerTurns rig_fingers_at(const GltfRig& rig, const FingerBones& bones,
 struct NodeTurns {
   /// Numbers of nodes in the file, parents first, and their rotations against their parents.
   std::vector<std::pair<int, Quat>> local;
-  Vec3 hips = Vec3::Zero();  ///< translation of hips_node() against its parent, the file's units
+  /// Numbers of nodes and their translations against their parents, the file's units: the hips, and
+  /// bones that hang elsewhere than on the body (GltfRig::carrier).
+  std::vector<std::pair<int, Vec3>> moved;
 };
 
 /// The formula: a node of joint j has the world rotation D_j T, where D_j is the joint's turn from
 /// the T-pose and T the node's world rotation in the T-pose; so of fingers. Only the hips are
-/// moved. All other nodes keep their local transform of the file.
+/// moved, and bones that hang elsewhere in the file than on the body: they stay where they are on
+/// the bone that they belong to. All other nodes keep their local transform of the file.
 class GltfOwnRig final : public OwnRig {
  public:
   /// `rig`: find_rig() of `file`.
@@ -35,10 +38,10 @@ class GltfOwnRig final : public OwnRig {
   const Mesh& mesh() const override { return mesh_; }
   const Joints& rest() const override { return rest_; }
   SkinWeights weights() const override { return joint_weights(file_, rig_); }
+  /// InputError where a bone would leave the bone that it belongs to.
   void place(const Pose& pose, const FingerTurns* fingers, Joints* joints,
              Points* vertices) const override;
 
-  int hips_node() const { return file_.nodes[static_cast<size_t>(rig_.hips)].number; }
   /// `fingers` may be null.
   NodeTurns turns(const Pose& pose, const FingerTurns* fingers) const;
   const Gltf& file() const { return file_; }
@@ -51,6 +54,8 @@ class GltfOwnRig final : public OwnRig {
   std::optional<Mat3> turn_of(size_t node, const Rotations& global,
                               const FingerTurns* fingers) const;
   Vec3 joint_at(const GltfTransforms& world, size_t j) const;
+  Vec3 carried(const GltfTransforms& world, size_t node) const;
+  void check_joined(const Joints& joints) const;
 
   Gltf file_;
   GltfRig rig_;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <optional>
 
 #include "autograd/base/format.h"
@@ -111,12 +112,14 @@ GltfTransforms bind_pose(const Gltf& file, ImportReport& report) {
 
 // ---- names -------------------------------------------------------------------------------------
 
-/// Nodes that may be bones: joints of skins and what hangs on them; all, if there are no skins.
+/// Nodes that may be bones: joints of skins, those of VRM's list, and what hangs on them; all, if
+/// there are no skins.
 std::vector<int> bone_nodes(const Gltf& file) {
   std::vector<bool> is(file.nodes.size());
   bool skins = false;
   for (const GltfBone& bone : file.bones)
     if (bone.skin >= 0) skins = is[bone.node] = true;
+  for (const auto& [name, node] : file.humanoid) is[static_cast<size_t>(node)] = true;
   std::vector<int> out;
   for (size_t n = 0; n < is.size(); ++n) {
     const int p = file.nodes[n].parent;
@@ -289,8 +292,9 @@ GltfTransforms turned(const Gltf& file, const GltfRig& rig,
                       const std::array<std::optional<Mat3>, kJoints>& turns) {
   std::vector<Mat3> by(file.nodes.size(), Mat3::Identity());
   GltfTransforms out(file.nodes.size());
-  for (size_t n = 0; n < out.size(); ++n) {
-    const int p = file.nodes[n].parent;
+  for (const int node : rig.order) {
+    const auto n = static_cast<size_t>(node);
+    const int p = rig.carrier[n];
     if (p >= 0) by[n] = by[p];
     for (size_t j = 0; j < kJoints; ++j)
       if (rig.node[j] == static_cast<int>(n) && turns[j]) by[n] = *turns[j];
@@ -302,8 +306,66 @@ GltfTransforms turned(const Gltf& file, const GltfRig& rig,
   return out;
 }
 
-void find_nodes(const Gltf& file, GltfRig& rig, const JointMap& map, const std::vector<int>& nodes,
-                ImportReport& report) {
+/// Whether a joint would be left behind if it moved with its nearest joint in the file, `nearest`,
+/// and not with the one above it in the body, `above`. Trunks are built in many ways: what hangs on
+/// another bone of the spine hangs well enough.
+bool left_behind(int above, int nearest) {
+  const auto upper_trunk = [](int j) {
+    return j == kSpine1 || j == kSpine2 || j == kSpine3 || (j >= 12 && j <= 14);
+  };
+  return nearest != above && !(upper_trunk(above) && nearest >= 0 && upper_trunk(nearest));
+}
+
+/// GltfRig::carrier and order.
+void find_carriers(const Gltf& file, GltfRig& rig, const std::vector<int>& owner,
+                   ImportReport& report) {
+  const size_t count = file.nodes.size();
+  rig.carrier.resize(count);
+  for (size_t n = 0; n < count; ++n) rig.carrier[n] = file.nodes[n].parent;
+  const auto own = [&](int j) {  // a node turns with it, and it lies there
+    const auto n = static_cast<size_t>(rig.node[static_cast<size_t>(j)]);
+    return owner[n] == j && rig.offset[static_cast<size_t>(j)].isZero();
+  };
+  std::vector<std::string> words;
+  for (int j = 1; j < kJoints; ++j) {
+    if (!own(j)) continue;
+    int above = kParents[j];
+    while (above > 0 && !own(above)) above = kParents[above];
+    const int node = rig.node[static_cast<size_t>(j)];
+    int nearest = file.nodes[static_cast<size_t>(node)].parent;
+    while (nearest >= 0 && nearest != rig.hips && owner[static_cast<size_t>(nearest)] < 0)
+      nearest = file.nodes[static_cast<size_t>(nearest)].parent;
+    const int joint = nearest < 0           ? -1
+                      : nearest == rig.hips ? kPelvis
+                                            : owner[static_cast<size_t>(nearest)];
+    if (!left_behind(above, joint)) continue;
+    rig.carrier[static_cast<size_t>(node)] = rig.node[static_cast<size_t>(above)];
+    words.push_back(
+        text::quote(file.nodes[static_cast<size_t>(node)].name) + " goes with " +
+        text::quote(file.nodes[static_cast<size_t>(rig.node[static_cast<size_t>(above)])].name));
+  }
+  if (!words.empty()) report.fact("bones that hang elsewhere", joined(words));
+  std::vector<int> state(count);  // 1: being placed, 2: placed
+  const std::function<void(int)> place = [&](int n) {
+    if (n < 0 || state[static_cast<size_t>(n)] == 2) return;
+    if (state[static_cast<size_t>(n)] == 1)
+      throw InputError(file.path,
+                       "bone " + text::quote(file.nodes[static_cast<size_t>(n)].name) +
+                           " hangs on a bone that would have to go with it",
+                       "name other bones with {bones} names.yaml");
+    state[static_cast<size_t>(n)] = 1;
+    place(file.nodes[static_cast<size_t>(n)].parent);
+    place(rig.carrier[static_cast<size_t>(n)]);
+    state[static_cast<size_t>(n)] = 2;
+    rig.order.push_back(n);
+  };
+  for (size_t n = 0; n < count; ++n) place(static_cast<int>(n));
+}
+
+void find_nodes(const Gltf& file, GltfRig& rig, const NamedJoints& names,
+                const std::vector<int>& nodes, ImportReport& report) {
+  const JointMap& map = names.map;
+  rig.hips = nodes[static_cast<size_t>(names.hips) - 1];
   std::vector<int> owner(file.nodes.size(), -1);
   std::vector<std::string> words;
   for (size_t j = 0; j < kJoints; ++j) {
@@ -322,6 +384,7 @@ void find_nodes(const Gltf& file, GltfRig& rig, const JointMap& map, const std::
     rig.joint[n] = owner[n] >= 0              ? owner[n]
                    : file.nodes[n].parent < 0 ? 0
                                               : rig.joint[file.nodes[n].parent];
+  find_carriers(file, rig, owner, report);
 }
 
 /// A skin on other bones than the person's is somebody else's (a horse's): one body of both would
@@ -377,15 +440,13 @@ GltfRig find_rig(const Gltf& file, const MotionOptions& options, ImportReport& r
   rig.bind = bind_pose(file, report);
   const std::vector<int> nodes = bone_nodes(file);
   const NamedJoints names = rig_names(file, nodes, rig.bind, profile);
-  const JointMap& map = names.map;
   if (by_list(file, profile))
     report.fact("names", "VRM's list of bones, not the nodes' names");
   else
     report.fact("names",
                 names.profile->title +
                     (names.profile->name.empty() ? "" : " (profile " + names.profile->name + ")"));
-  find_nodes(file, rig, map, nodes, report);
-  rig.hips = nodes[static_cast<size_t>(names.hips) - 1];
+  find_nodes(file, rig, names, nodes, report);
   check_skins(file, rig);
   Joints joints;
   for (size_t j = 0; j < kJoints; ++j)

@@ -18,8 +18,13 @@ struct GltfRig {
   std::array<int, kJoints> node{};     ///< which turns with each of the 22 joints
   std::array<Vec3, kJoints> offset{};  ///< of the joint from its node, T-pose
   std::vector<int> joint;              ///< per node: the nearest of the 22 at it or above it
-  double scale = 1;                    ///< metres per unit
-  Mat3 turn = Mat3::Identity();        ///< to y up, facing +z
+  /// Per node, what it moves with: its parent in the file, or -1. A bone that does not hang on the
+  /// bone above it in the body moves with that one all the same: feet and hands that hang on the
+  /// armature, as goals of the maker's IK; thighs that hang on a root.
+  std::vector<int> carrier;
+  std::vector<int> order;        ///< all nodes, parents and carriers first
+  double scale = 1;              ///< metres per unit
+  Mat3 turn = Mat3::Identity();  ///< to y up, facing +z
 
   Vec3 to_ours(const Vec3& x) const { return scale * (turn * x); }
 };

@@ -197,8 +197,8 @@ class Builder {
       }
       vertices_of_.clear();
       morphs_of_mesh_ = 0;
-      for (const tinygltf::Primitive& primitive : model_.meshes[wearer.mesh].primitives)
-        read_primitive(wearer, primitive);
+      const auto& primitives = model_.meshes[wearer.mesh].primitives;
+      for (size_t p = 0; p < primitives.size(); ++p) read_primitive(wearer, primitives[p], p);
       ++out_.meshes;
       out_.morph_targets += morphs_of_mesh_;
     }
@@ -206,7 +206,7 @@ class Builder {
       broken(path_, "has more vertices than can be counted");
   }
 
-  void read_primitive(const Wearer& wearer, const tinygltf::Primitive& primitive) {
+  void read_primitive(const Wearer& wearer, const tinygltf::Primitive& primitive, size_t number) {
     const int mode = primitive.mode < 0 ? TINYGLTF_MODE_TRIANGLES : primitive.mode;
     if (mode == TINYGLTF_MODE_LINE || mode == TINYGLTF_MODE_LINE_LOOP ||
         mode == TINYGLTF_MODE_LINE_STRIP) {
@@ -226,6 +226,7 @@ class Builder {
     const auto [at, is_new] = vertices_of_.try_emplace(key, std::make_pair(size_t{0}, size_t{0}));
     const auto& [first, count] = at->second;
     if (is_new) at->second = read_vertices(wearer, primitive, position->second, skinned);
+    out_.parts.push_back({out_.nodes[wearer.node].number, number, first, count});
     if (is_new && runs_ != nullptr)
       runs_->vertices.push_back({&primitive, static_cast<int>(wearer.node), first, count});
     const size_t faces = out_.faces.size();

@@ -61,6 +61,13 @@ struct GltfClip {
   double begin = 0, end = 0;  ///< seconds of the first and the last key
 };
 
+/// Which vertices are a primitive's.
+struct GltfPart {
+  int node;          ///< number in the file of the node that shows it
+  size_t primitive;  ///< of the node's mesh
+  size_t first, count;
+};
+
 struct Gltf {
   std::string path;
   uint64_t bytes = 0;  ///< of the file and its buffers
@@ -70,6 +77,7 @@ struct Gltf {
   /// All meshes of the scene, one after the other, as stored: a vertex is in the world where its
   /// influences put it. With skins, unskinned meshes that hang on no joint are left out (remark).
   Points vertices;
+  std::vector<GltfPart> parts;
   std::vector<uint32_t> first_influence;  ///< V + 1; vertex v has [v] to [v + 1)
   std::vector<GltfInfluence> influences;  ///< weights of a vertex sum to 1
   std::vector<Triangle> faces;

@@ -53,7 +53,13 @@ auto with_target(const RetargetCommand& c, const TargetMesh& target, const Work&
   try {
     return work();
   } catch (const InputError& error) {
-    if (target.unknown_rig.empty() || !std::string(error.what()).starts_with(c.target)) throw;
+    if (!std::string(error.what()).starts_with(c.target)) throw;
+    if (!target.parts.empty())
+      throw InputError(
+          c.target,
+          cat("has no skin and no bones, but ", target.parts, ", and as one mesh ", error.cause()),
+          "bind its parts to a skeleton in the program that made them, and export again");
+    if (target.unknown_rig.empty()) throw;
     throw InputError(
         c.target, "it would be posed by its rig, which was not recognised: " + target.unknown_rig,
         "say which bone is which joint with --bones names.yaml (docs/formats.md)");
@@ -321,6 +327,10 @@ void add_system_options(CommandOptions app, RetargetCommand& c) {
       "comes back within half a second");
   app.add_flag("!--no-foot-lock", c.options.foot_lock,
                "feet that stand are not held where they landed");
+  app.add_option("--floor", c.floor,
+                 "on: soles stand on the floor, and no foot goes below it; off (default: on, but "
+                 "for X.h5 of a target without bones)")
+      .one_of({"on", "off"});
   app.add_flag("!--no-keep-limbs", c.options.keep_limbs,
                "legs and arms that cross are named as each frame shows them");
   app.add_flag("!--no-steady-bones", c.options.steady_bones,
@@ -378,8 +388,8 @@ void check_kept(const RetargetCommand& c, const TargetMesh& target) {
   if (target.unknown_rig.empty() || !c.to.skeleton.empty()) return;
   if (!text::ends_in(c.to.out, {".glb", ".gltf", ".vrm"})) return;
   throw InputError(c.target, "its rig was not recognised: " + target.unknown_rig,
-                   "name its bones with --bones names.yaml, or ask for a skeleton of ours with "
-                   "--skeleton restage");
+                   "name its bones with --bones names.yaml; or, if its mesh stands in T-pose, "
+                   "facing +z, ask for a skeleton of ours with --skeleton restage");
 }
 
 void check_mesh(const RetargetCommand& c, const TargetMesh& target) {
@@ -395,6 +405,8 @@ SystemInput load_input(const RetargetCommand& c, const Common& common) {
   const SystemType& type = system_type(c.system);
   if (!c.rest.empty() && !type.own_skin)  // it moves vertices without joints
     throw InputError("", "--rest says nothing to --system " + type.name, "leave it out");
+  if (!c.floor.empty() && std::count(type.roles.begin(), type.roles.end(), "skeleton") == 0)
+    throw InputError("", "--floor says nothing to --system " + type.name, "leave it out");
   if (c.weights.empty() && type.roles.empty()) return input;
   const std::string weights = c.weights.empty() ? standard_weights() : c.weights;
   input.weights_name = weights_path(weights);
@@ -419,8 +431,14 @@ SinkOptions sink_options(const RetargetCommand& c, const SystemInput& input,
   return out;
 }
 
+bool floor_is_on(const RetargetCommand& c, const TargetMesh& target) {
+  if (!c.floor.empty()) return c.floor == "on";
+  return target.own || !(c.to.out.empty() || text::ends_in(c.to.out, {".h5", ".hdf5"}));
+}
+
 std::unique_ptr<System> system_for(const RetargetCommand& c, SystemInput input,
                                    TargetMesh& target) {
+  input.options.floor = floor_is_on(c, target);
   if (!c.rest.empty()) input.rest = rest_joints(c.rest);
   joints_given(c, input);
   if (target.own && !c.rest.empty())
@@ -463,7 +481,7 @@ void add_retarget(Program& program) {
       "--no-foot-lock\n"
       "restage retarget --source s.h5 --target a.ply --out r.h5 --no-steady-bones --no-keep-limbs "
       "--online\n"
-      "restage retarget --source s.h5 --target a.ply --out r.h5 --joints smpl\n"
+      "restage retarget --source s.h5 --target a.ply --out r.h5 --joints smpl --floor on\n"
       "restage retarget --source scans.h5 --target hero.ply --system register --rest rest.h5 "
       "--out r.h5",
       run_retarget);

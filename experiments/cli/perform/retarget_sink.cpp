@@ -7,6 +7,7 @@
 #include "autograd/base/format.h"
 #include "autograd/base/log.h"
 #include "datasets/characters/gltf_clip.h"
+#include "datasets/characters/gltf_document.h"
 #include "datasets/characters/mesh_template.h"
 #include "datasets/frame_writer.h"
 #include "datasets/readers/text/text.h"
@@ -92,11 +93,37 @@ Sink vrma_sink(const SinkOptions& options, const Shown& shown, const std::string
                           [writer](const Frames&) { writer->commit(); }});
 }
 
+/// The document of a glTF or FBX target without bones, which keeps everything that it holds and
+/// gets a skeleton of ours. Not known: of another kind, or with bones that were not recognised.
+class BareDocument {
+ public:
+  explicit BareDocument(const std::string& target) {
+    if (!is_gltf_name(target)) return;
+    content_ = read_gltf_bytes(target);
+    file_ = parse_gltf(content_, target);
+    if (file_.skin_nodes.empty()) document_ = std::make_unique<GltfDocument>(content_, target);
+  }
+  bool known() const { return document_ != nullptr; }
+  void check(const std::string& out) const { document_->check_place(out); }
+  void write(const std::string& glb, const std::string& out) {
+    document_->wear(glb, file_);
+    document_->write(out);
+  }
+
+ private:
+  std::string content_;
+  Gltf file_;
+  std::unique_ptr<GltfDocument> document_;
+};
+
 /// A GLB file for a target without bones that we know. The file gets a skeleton and a skin of ours.
-Sink glb_sink(const SinkOptions& options, const Shown& shown) {
-  if (!text::ends_in(options.out, {".glb"}))
+Sink glb_sink(const SinkOptions& options, const Shown& shown, const std::string& target) {
+  const auto bare = std::make_shared<BareDocument>(target);
+  if (!text::ends_in(options.out, {".glb"}) &&
+      !(bare->known() && text::ends_in(options.out, {".gltf"})))
     throw InputError(options.out, "keeps the target's own file, which has no rig that we know",
                      "end --out in .glb, or name its bones with --bones");
+  if (bare->known()) bare->check(options.out);
   if (options.animation_only || !options.clip_name.empty())
     throw InputError(options.out, "gets a skeleton of ours, whose animation has a fixed name",
                      "leave --clip-name and --animation-only out");
@@ -106,9 +133,13 @@ Sink glb_sink(const SinkOptions& options, const Shown& shown) {
   if (!options.skeleton.empty()) how.skeleton = options.skeleton;
   const auto writer =
       std::make_shared<GlbWriter>(options.out, shown.target, rig.rest, rig.weights, how);
-  const auto commit = [writer](const Frames& filled) {
+  const auto commit = [writer, bare, out = options.out](const Frames& filled) {
     writer->set_filled(filled);
-    const InfluenceError e = writer->commit();
+    if (bare->known())
+      bare->write(writer->bytes(), out);
+    else
+      writer->commit();
+    const InfluenceError e = writer->influence_error();
     log_info(format("four weights per vertex instead of 22: %.2f mm on average, at most %.2f mm",
                     1e3 * e.mean, 1e3 * e.max));
     const DistanceSummary surface = writer->surface_error();
@@ -306,7 +337,7 @@ Sink make_sink(const SinkOptions& options, const Shown& shown,
     return options.fps == kFps ? sink : at_rate(std::move(sink), options.fps);
   };
   if (is_character(options.out))
-    return timed(own ? own_sink(options, clip, target, own) : glb_sink(options, shown));
+    return timed(own ? own_sink(options, clip, target, own) : glb_sink(options, shown, target));
   if (is_vrma(options.out)) return timed(vrma_sink(options, shown, clip));
   if (options.out.ends_with(".bvh")) return timed(bvh_sink(options, shown, own));
   if (options.out.ends_with(".h5")) return in_joints(options, hdf5_sink(options, shown, source));

@@ -8,6 +8,7 @@
 #include "experiments/cli/perform/retarget.h"
 #include "experiments/cli/perform/retarget_words.h"
 #include "experiments/text.h"
+#include "infer/footing.h"
 #include "infer/frame_rate.h"
 
 namespace restage::cli {
@@ -91,6 +92,37 @@ TakeOptions options_of(const RetargetCommand& c, const Joints& performer) {
   return out;
 }
 
+/// Keeps the feet of a target above the floor that performs another's motion.
+class Floor {
+ public:
+  Floor(const SkeletonTake& take, const Shown& shown)
+      : take_(take),
+        rest_(shown.rig->rest),
+        scale_(leg_length(rest_) / std::max(leg_length(take.rest), 1e-9)),
+        soles_(shown.target, rest_, shown.rig->weights) {}
+
+  /// Somebody with the source's own legs does exactly what the source does, whatever that is.
+  bool is_needed() const {
+    constexpr double kSame = 0.01;  // of the leg
+    const auto from_pelvis = [](const Joints& x, size_t j) { return Vec3(x[j] - x[kPelvis]); };
+    for (const size_t j : {1, 2, 4, 5, 7, 8, 10, 11})
+      if ((from_pelvis(rest_, j) - scale_ * from_pelvis(take_.rest, j)).norm() >
+          kSame * leg_length(rest_))
+        return true;
+    return false;
+  }
+  void operator()(size_t frame, Pose* pose) const {
+    keep_above(least_heights(take_.frames[frame].joints, flat_foot(take_.rest), scale_), soles_,
+               rest_, pose);
+  }
+
+ private:
+  const SkeletonTake& take_;
+  const Joints& rest_;
+  double scale_;
+  Soles soles_;
+};
+
 }  // namespace
 
 bool has_take(const RetargetCommand& c, std::string* why) {
@@ -104,7 +136,7 @@ Retargeted run_take(const RetargetCommand& c, const Common& common, const Retarg
   if (target.own) check_no_network(c);
   SystemInput input;
   if (!target.own) {
-    if (!c.options.force) check_target(target.mesh, c.target, target.known());
+    check_mesh(c, target);
     input = load_input(c, common);
   }
   const SinkOptions to = sink_options(c, input, target);
@@ -125,11 +157,15 @@ Retargeted run_take(const RetargetCommand& c, const Common& common, const Retarg
                                 : make_sink(to, shown, source, take.name, c.target, target.own);
   say_take(take);
   say_target(target);
+  std::optional<Floor> floor;
+  if (floor_is_on(c, target) && shown.rig != nullptr) floor.emplace(take, shown);
+  if (floor && !floor->is_needed()) floor.reset();
   int64_t frames = 0;
   for (size_t f = 0; f < take.frames.size(); f += static_cast<size_t>(c.to.every)) {
     caller.look();
     RetargetedFrame frame;
     frame.pose = perform_take(take, f, rest);
+    if (floor) (*floor)(f, &frame.pose);
     frame.joints.emplace();
     if (!take.fingers.empty()) frame.fingers = take.fingers[f];
     if (target.own) {

@@ -45,10 +45,8 @@ void say_target(const TargetMesh& target) {
     return;
   }
   const Gltf& file = target.own->file();
-  const auto skinned = std::count_if(file.bones.begin(), file.bones.end(),
-                                     [](const GltfBone& bone) { return bone.skin >= 0; });
   std::string line = file.standard.empty() ? "" : file.standard + ", ";
-  line += cat(family(report), " (", skinned, "), ", rest_pose(report), ", ",
+  line += cat(family(report), " (", skin_joints(file), "), ", rest_pose(report), ", ",
               counted(file.meshes, "mesh", "meshes"));
   if (file.morph_targets > 0) line += ", " + counted(file.morph_targets, "morph target");
   say(line, report);

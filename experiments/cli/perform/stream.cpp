@@ -343,7 +343,10 @@ int run_stream(const StreamCommand& c, const Common& common) {
   const ToOurs in_range(c.how.source.scale, c.how.source.up);
   TargetMesh target = read_target(c.how.target, c.how.bones);
   check_mesh(c.how, target);
-  const auto system = system_for(c.how, load_input(c.how, common), target);
+  SystemInput made_from = load_input(c.how, common);
+  RetargetCommand how = c.how;
+  if (how.floor.empty()) how.floor = "on";  // nobody measures what is shown
+  const auto system = system_for(how, std::move(made_from), target);
   if (system->rig() == nullptr)
     throw InputError(c.how.target, "is moved without bones by --system " + c.how.system,
                      "use --system chain");

@@ -1,0 +1,71 @@
+#include "nn/geometry/soles.h"
+
+#include <algorithm>
+
+#include "nn/geometry/contact.h"
+#include "nn/geometry/skinning.h"
+
+namespace restage {
+
+std::vector<int32_t> outermost(const Points& points, const std::vector<int32_t>& some) {
+  std::vector<int32_t> out;
+  for (int code = 0; code < 27 && !some.empty(); ++code) {
+    const Point way(static_cast<float>(code % 3 - 1), static_cast<float>(code / 3 % 3 - 1),
+                    static_cast<float>(code / 9 - 1));
+    if (way.isZero()) continue;
+    out.push_back(*std::max_element(some.begin(), some.end(), [&](int32_t a, int32_t b) {
+      return way.dot(points[static_cast<size_t>(a)]) < way.dot(points[static_cast<size_t>(b)]);
+    }));
+  }
+  std::sort(out.begin(), out.end());
+  out.erase(std::unique(out.begin(), out.end()), out.end());
+  return out;
+}
+
+Soles::Soles(const Joints& rest) : rest_(rest) {
+  for (size_t side = 0; side < 2; ++side) {
+    const auto foot = static_cast<size_t>(kFeet[side]);
+    Spot spot{rest[foot], {}};
+    spot.place.y() = 0;
+    spot.weights[foot] = 1;
+    feet_[side].push_back(spot);
+  }
+}
+
+Soles::Soles(const Mesh& mesh, const Joints& rest, const SkinWeights& weights) : Soles(rest) {
+  for (size_t side = 0; side < 2; ++side) {
+    std::vector<int32_t> foot;
+    for (Eigen::Index v = 0; v < weights.rows(); ++v)
+      if (weights(v, 7 + static_cast<int>(side)) + weights(v, kFeet[side]) > 0.5f)
+        foot.push_back(static_cast<int32_t>(v));
+    if (foot.empty()) continue;
+    feet_[side].clear();
+    for (const int32_t v : outermost(mesh.vertices, foot)) {
+      Spot spot{mesh.vertices[static_cast<size_t>(v)].cast<double>(), {}};
+      std::copy_n(weights.row(v).data(), kJoints, spot.weights.begin());
+      feet_[side].push_back(spot);
+    }
+  }
+}
+
+std::array<double, 2> Soles::lowest(const PosedSkeleton& posed) const {
+  std::array<double, 2> out;
+  for (size_t side = 0; side < 2; ++side) {
+    const auto height = [&](const Spot& spot) {
+      return blend(spot.place, spot.weights.data(), rest_, posed).y();
+    };
+    out[side] = height(feet_[side].front());
+    for (const Spot& spot : feet_[side]) out[side] = std::min(out[side], height(spot));
+  }
+  return out;
+}
+
+void keep_above(const std::array<double, 2>& floor, const Soles& soles, const Joints& rest,
+                Pose* pose) {
+  const std::array<double, 2> lowest = soles.lowest(forward_kinematics(rest, *pose));
+  for (size_t side = 0; side < 2; ++side)
+    if (const double depth = floor[side] - lowest[side]; depth > 0)
+      move_foot(rest, static_cast<int>(side), Vec3(0, depth, 0), pose);
+}
+
+}  // namespace restage

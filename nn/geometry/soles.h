@@ -1,0 +1,41 @@
+// The soles of a body: which points of its surface touch the floor first, and where a pose puts
+// them.
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "nn/geometry/body.h"
+
+namespace restage {
+
+/// Of `some` of the points, those farthest out in 26 directions, in ascending order.
+std::vector<int32_t> outermost(const Points& points, const std::vector<int32_t>& some);
+
+class Soles {
+ public:
+  /// `mesh` in T-pose with its joints at `rest`. A vertex belongs to a foot if the ankle and the
+  /// foot joint of that side move it by more than half.
+  Soles(const Mesh& mesh, const Joints& rest, const SkinWeights& weights);
+  /// Without a surface: the foot joints themselves, as high over the floor as they rest.
+  explicit Soles(const Joints& rest);
+
+  /// Height of the lowest point of the left and of the right foot, metres. A foot without vertices
+  /// has its joint for a sole.
+  std::array<double, 2> lowest(const PosedSkeleton& posed) const;
+
+ private:
+  struct Spot {
+    Vec3 place;  ///< in T-pose
+    std::array<float, kJoints> weights;
+  };
+  Joints rest_;
+  std::array<std::vector<Spot>, 2> feet_;
+};
+
+/// Raises each foot whose sole lies under `floor` (heights for left and right, metres): hip and
+/// knee give way, the foot keeps its orientation.
+void keep_above(const std::array<double, 2>& floor, const Soles& soles, const Joints& rest,
+                Pose* pose);
+
+}  // namespace restage
