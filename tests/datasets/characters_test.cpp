@@ -139,6 +139,54 @@ TEST_F(Characters, ATrunkBesideItsLegsIsMovedByWhatCarriesBoth) {
   expect_played(in, performed(in, dir / "out.glb"));
 }
 
+TEST_F(Characters, APelvisThatIsNamedBesideTheLegsIsMovedByWhatCarriesBoth) {
+  // Body carries the thighs and Hips, and is named for nothing.
+  RigStyle style = testing::plain_style();
+  style.names[0] = "Body";
+  style.names[3] = "Hips";
+  const std::string in = write("in.glb", CharacterMaker(known_, style).parts);
+  std::string bones = testing::bones_yaml(style);
+  const auto change = [&](const std::string& from, const std::string& to) {
+    bones.replace(bones.find(from), from.size(), to);
+  };
+  change("pelvis: \"Body\"", "pelvis: \"Hips\"");
+  change("  spine1: \"Hips\"\n", "");
+  const TargetMesh target = read_target(in, dir.write("names.yaml", bones));
+  ASSERT_TRUE(target.own);
+  Joints joints;
+  Points vertices;
+  Pose stands;
+  stands.local.fill(Mat3::Identity());
+  stands.root = target.own->rest()[kPelvis];
+  target.own->place(stands, nullptr, &joints, &vertices);
+  for (size_t v = 0; v < vertices.size(); ++v)
+    ASSERT_LT((vertices[v] - target.own->mesh().vertices[v]).norm(), 1e-5) << v;
+  for (size_t f = 0; f < kFrames; ++f) {
+    const Pose now = pose(f);
+    target.own->place(now, nullptr, &joints, &vertices);
+    EXPECT_LT((joints[kPelvis] - now.root).norm(), 1e-6) << f;
+  }
+}
+
+/// Toes and fingers on the armature, which nobody names.
+TEST_F(Characters, WhatMovesVerticesIsNeverLeftBehind) {
+  RigStyle style = testing::mixamo_style();
+  const std::string whole = write("whole.glb", CharacterMaker(known_, style).parts);
+  style.hung = {{10, -1}, {11, -1}};
+  const std::string in = write("in.glb", CharacterMaker(known_, style).parts);
+  const TargetMesh target = read_target(in), other = read_target(whole);
+  ASSERT_TRUE(target.own && other.own);
+  for (size_t f = 0; f < kFrames; ++f) {
+    Pose now = pose(f);
+    now.local[10] = now.local[11] = Mat3::Identity();  // toes that were not found do not turn
+    Joints joints;
+    Points got, wanted;
+    target.own->place(now, nullptr, &joints, &got);
+    other.own->place(now, nullptr, &joints, &wanted);
+    for (size_t v = 0; v < got.size(); ++v) ASSERT_LT((got[v] - wanted[v]).norm(), 1e-4) << f;
+  }
+}
+
 TEST_F(Characters, RigidPartsAreDrivenByTheirNodes) {
   RigStyle style = testing::mixamo_style();
   style.rigid = true;

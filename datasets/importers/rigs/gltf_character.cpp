@@ -253,7 +253,7 @@ TargetMesh read_target(const std::string& path, const std::string& bones) {
     if (out.rigged)
       out.unknown_rig = error.reason;
     else
-      out.parts = words_of(file, parts);
+      out.parts = words_of(file, parts), out.unknown_parts = error.reason;
   }
   if (!out.rigged || !out.unknown_rig.empty()) {
     out.report.remark(!out.rigged
