@@ -13,7 +13,6 @@ import json
 import math
 import re
 import sys
-import textwrap
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -168,15 +167,14 @@ late = Row("**standard, two frames late**", ours["two frames late"])
 no_motion = Row("no motion network", trials("shipped")["no motion network"])
 lite = Row("lite (earlier program)", benchmark["Restage lite"])
 register = Row("register, then repose", benchmark["register then repose"])
-closed_form, unchanged, rest_pose = (Row(name.replace("_", " "), standard.trials, name)
-                                     for name in ("closed_form", "source_unchanged", "rest_pose"))
+closed_form, unchanged = (Row(name.replace("_", " "), standard.trials, name) for name in ("closed_form", "source_unchanged"))
 earlier = Row("the weights before", seeds["standard"])
 
 SETS = {"test": "more motions", "naked": "naked", "clothed": "clothed", "scans:-rig": "eight cameras",
         "scans:-depth": "one camera"}
 TOLD = {standard: "clouds", late: "clouds", no_motion: "clouds", lite: "clouds",
         register: "clouds, target's true joints", closed_form: "true joints of both",
-        unchanged: "true joints of the source", rest_pose: "true joints of both"}
+        unchanged: "true joints of the source"}
 KINDS = {"naked": "whole", "clothed": "whole, clothed, hair", "scans:six_cameras": "six cameras",
          "scans:one_camera": "one camera"}
 
@@ -228,7 +226,7 @@ def real():
 def kinds_table():
     metrics = ("pa_mpjpe", "mpjpe", "pa_mpvd", "acc")
     rows = [Row("**as `retarget` does**: two frames late, bones and limbs held", kinds["as retarget does"]),
-            *(Row(case, kinds[case]) for case in ("at once, bones held", "at once, bones not held", "no motion network", "lite"))]
+            *(Row(case, kinds[case]) for case in ("at once, bones held", "at once, bones not held", "no motion network"))]
     head = ["", *(f"{KINDS[k]} ({count(rows[0], k)})" for k in KINDS)]
     return table(head, [[r.label, *cells(r, KINDS, metrics)] for r in rows])
 
@@ -269,16 +267,6 @@ def sure():
     shares = [f"{100 * point['coverage']:.0f} %" for point in curves["naked"]]
     rows = [[words, *(number(point["pa_mpjpe"], "pa_mpjpe") for point in curve)] for words, curve in curves.items()]
     return table(["surest frames", *shares], rows)
-
-
-def joints():
-    errors = standard.trials[0].sets["naked"]["joints"]
-    sides = {}
-    for name, value in errors.items():
-        sides.setdefault(re.sub("^(left|right)_|[123]$", "", name), []).append(value)
-    ordered = sorted(sides.items(), key=lambda item: mean(item[1]))
-    errors = ", ".join(f"{name} {number(mean(values), 'pa_mpjpe')}" for name, values in ordered)
-    return textwrap.fill("**By joint** (standard, naked, PA-MPJPE, mean of both sides): " + errors, 119)
 
 
 # ---- the page ------------------------------------------------------------------------------------
@@ -324,8 +312,6 @@ Lite is the mean of {lite_count} seeds, all others are one training. "Is told": 
 * Alignment removes place, turn and size, so "source unchanged" looks good in PA-MPJPE. MPJPE shows the difference.
 * "Lite" is of an earlier program.
 
-{joints}.
-
 ## Is a difference real?
 
 Differences, before rounding, are paired over sequences, with [95 % intervals](metrics.md#when-is-a-difference-real), which err
@@ -369,12 +355,6 @@ count alike, in the tables above all sequences, so 100 % differs a little.
 
 {sure}
 
-## Elsewhere
-
-* [Switches of the motion network](reproduction/ours.md), [other systems](systems.md#results),
-  [speed](performance.md), [the papers' tables](reproduction.md),
-  [fine-tuning](decisions.md#extractor).
-
 `restage sweep table experiments/studies/standard` shows intervals. `sweep.yaml` there says how to run the sweep.
 """
 
@@ -386,7 +366,7 @@ def page():
         lite_count=len(lite.trials), glance=glance(), seeds_differ=seeds_differ(),
         joint_table=by_set(("pa_mpjpe", "mpjpe"), list(TOLD), True),
         surface_table=by_set(("pa_mpvd", "mpvd", "medl"), with_surface),
-        calm_table=by_set(("acc", "foot_slide_mm"), moving), joints=joints(), real=real(),
+        calm_table=by_set(("acc", "foot_slide_mm"), moving), real=real(),
         late_differences=late_differences(), kinds_table=kinds_table(), rotations=rotations(),
         same_for_all=same_for_all(), sure=sure())
 
