@@ -197,7 +197,7 @@ def glance_rows():
 
 def seeds_differ():
     """How far three trainings of the weights before differed."""
-    return ", ".join(f"{words} {number(deviation(earlier.each(kind, 'pa_mpjpe')), 'pa_mpjpe')}" for kind, words in GLANCE.items())
+    return ", ".join(number(deviation(earlier.each(kind, "pa_mpjpe")), "pa_mpjpe") for kind in GLANCE)
 
 
 def glance():
@@ -286,8 +286,9 @@ PA-MPVD. "Source unchanged" hands on the source's true skeleton.
 
 {glance}
 
-* Three trainings of the weights before these ([seeds](../experiments/studies/standard_seeds/sweep.yaml)) differed in joints by a sample
-  deviation of {seeds_differ}. They share two of the networks' parts, so the true spread is larger.
+* How far seeds differ is known of [the weights before](../experiments/studies/standard_seeds/sweep.yaml): the joints of
+  three trainings have a sample deviation of {seeds_differ} in these rows.
+  The trainings share two of the networks' parts, so the true spread is larger.
 * **The tables are of sweeps, which do not [hold bones](real_scans.md#one-person-is-one-skeleton) and do not [keep the
   names of limbs](real_scans.md#limbs-that-cross-keep-their-names).** `retarget` does both. The
   effect of held bones is [below](#four-kinds-of-cloud-pa-mpjpe--mpjpe--pa-mpvd--acc).
