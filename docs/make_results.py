@@ -13,7 +13,6 @@ import json
 import math
 import re
 import sys
-import textwrap
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -168,15 +167,14 @@ late = Row("**standard, two frames late**", ours["two frames late"])
 no_motion = Row("no motion network", trials("shipped")["no motion network"])
 lite = Row("lite (earlier program)", benchmark["Restage lite"])
 register = Row("register, then repose", benchmark["register then repose"])
-closed_form, unchanged, rest_pose = (Row(name.replace("_", " "), standard.trials, name)
-                                     for name in ("closed_form", "source_unchanged", "rest_pose"))
+closed_form, unchanged = (Row(name.replace("_", " "), standard.trials, name) for name in ("closed_form", "source_unchanged"))
 earlier = Row("the weights before", seeds["standard"])
 
 SETS = {"test": "more motions", "naked": "naked", "clothed": "clothed", "scans:-rig": "eight cameras",
         "scans:-depth": "one camera"}
 TOLD = {standard: "clouds", late: "clouds", no_motion: "clouds", lite: "clouds",
         register: "clouds, target's true joints", closed_form: "true joints of both",
-        unchanged: "true joints of the source", rest_pose: "true joints of both"}
+        unchanged: "true joints of the source"}
 KINDS = {"naked": "whole", "clothed": "whole, clothed, hair", "scans:six_cameras": "six cameras",
          "scans:one_camera": "one camera"}
 
@@ -199,7 +197,7 @@ def glance_rows():
 
 def seeds_differ():
     """How far three trainings of the weights before differed."""
-    return ", ".join(f"{words} {number(deviation(earlier.each(kind, 'pa_mpjpe')), 'pa_mpjpe')}" for kind, words in GLANCE.items())
+    return ", ".join(number(deviation(earlier.each(kind, "pa_mpjpe")), "pa_mpjpe") for kind in GLANCE)
 
 
 def glance():
@@ -228,7 +226,7 @@ def real():
 def kinds_table():
     metrics = ("pa_mpjpe", "mpjpe", "pa_mpvd", "acc")
     rows = [Row("**as `retarget` does**: two frames late, bones and limbs held", kinds["as retarget does"]),
-            *(Row(case, kinds[case]) for case in ("at once, bones held", "at once, bones not held", "no motion network", "lite"))]
+            *(Row(case, kinds[case]) for case in ("at once, bones held", "at once, bones not held", "no motion network"))]
     head = ["", *(f"{KINDS[k]} ({count(rows[0], k)})" for k in KINDS)]
     return table(head, [[r.label, *cells(r, KINDS, metrics)] for r in rows])
 
@@ -271,16 +269,6 @@ def sure():
     return table(["surest frames", *shares], rows)
 
 
-def joints():
-    errors = standard.trials[0].sets["naked"]["joints"]
-    sides = {}
-    for name, value in errors.items():
-        sides.setdefault(re.sub("^(left|right)_|[123]$", "", name), []).append(value)
-    ordered = sorted(sides.items(), key=lambda item: mean(item[1]))
-    errors = ", ".join(f"{name} {number(mean(values), 'pa_mpjpe')}" for name, values in ordered)
-    return textwrap.fill("**By joint** (standard, naked, PA-MPJPE, mean of both sides): " + errors, 119)
-
-
 # ---- the page ------------------------------------------------------------------------------------
 
 TEMPLATE = """# Results
@@ -298,8 +286,9 @@ PA-MPVD. "Source unchanged" hands on the source's true skeleton.
 
 {glance}
 
-* Three trainings of the weights before these ([seeds](../experiments/studies/standard_seeds/sweep.yaml)) differed in joints by a sample
-  deviation of {seeds_differ}. They share two of the networks' parts, so the true spread is larger.
+* How far seeds differ is known of [the weights before](../experiments/studies/standard_seeds/sweep.yaml): the joints of
+  three trainings have a sample deviation of {seeds_differ} in these rows.
+  The trainings share two of the networks' parts, so the true spread is larger.
 * **The tables are of sweeps, which do not [hold bones](real_scans.md#one-person-is-one-skeleton) and do not [keep the
   names of limbs](real_scans.md#limbs-that-cross-keep-their-names).** `retarget` does both. The
   effect of held bones is [below](#four-kinds-of-cloud-pa-mpjpe--mpjpe--pa-mpvd--acc).
@@ -323,8 +312,6 @@ Lite is the mean of {lite_count} seeds, all others are one training. "Is told": 
 * A rule makes the truth. The closed form follows nearly the same rule with true joints: its joints are near the best.
 * Alignment removes place, turn and size, so "source unchanged" looks good in PA-MPJPE. MPJPE shows the difference.
 * "Lite" is of an earlier program.
-
-{joints}.
 
 ## Is a difference real?
 
@@ -369,12 +356,6 @@ count alike, in the tables above all sequences, so 100 % differs a little.
 
 {sure}
 
-## Elsewhere
-
-* [Switches of the motion network](reproduction/ours.md), [other systems](systems.md#results),
-  [speed](performance.md), [the papers' tables](reproduction.md),
-  [fine-tuning](decisions.md#extractor).
-
 `restage sweep table experiments/studies/standard` shows intervals. `sweep.yaml` there says how to run the sweep.
 """
 
@@ -386,7 +367,7 @@ def page():
         lite_count=len(lite.trials), glance=glance(), seeds_differ=seeds_differ(),
         joint_table=by_set(("pa_mpjpe", "mpjpe"), list(TOLD), True),
         surface_table=by_set(("pa_mpvd", "mpvd", "medl"), with_surface),
-        calm_table=by_set(("acc", "foot_slide_mm"), moving), joints=joints(), real=real(),
+        calm_table=by_set(("acc", "foot_slide_mm"), moving), real=real(),
         late_differences=late_differences(), kinds_table=kinds_table(), rotations=rotations(),
         same_for_all=same_for_all(), sure=sure())
 

@@ -10,6 +10,7 @@ namespace {
 
 constexpr double kStands = 0.5;    // a foot with a greater chance stands
 constexpr double kSettling = 0.2;  // seconds
+constexpr double kLetDown = 0.75;  // of a lift is left in the next frame
 
 // In units of the leg, hip to ankle: how far a foot that is on the floor may be from standing flat,
 // and one that is elsewhere has to be.
@@ -31,8 +32,8 @@ std::array<double, 2> sole_heights(const Joints& a, const FlatFoot& flat, double
   const double leg = leg_length(a);
   std::array<double, 2> out;
   for (size_t side = 0; side < 2; ++side) {
-    const double clear = std::min(a[7 + side].y() - flat.ankle,
-                                  a[static_cast<size_t>(kFeet[side])].y() - flat.ball);
+    const double clear =
+        std::min(a[7 + side].y() - flat.ankle, a[static_cast<size_t>(kFeet[side])].y() - flat.ball);
     const double t = std::clamp(
         (std::abs(clear) / std::max(leg, 1e-6) - kOnFloor) / (kElsewhere - kOnFloor), 0.0, 1.0);
     out[side] = t * t * (3 - 2 * t) * scale * clear;
@@ -70,8 +71,12 @@ std::array<double, 2> Footing::operator()(const Joints& rest, const Joints& a, d
   return above;
 }
 
-void Footing::keep_above(const Joints& rest, const Joints& a, double scale, Pose* pose) const {
-  restage::keep_above(least_heights(a, bare_foot(a), scale), soles_, rest, pose);
+void Footing::keep_above(const Joints& rest, const Joints& a, double scale, Pose* pose) {
+  const std::array<double, 2> deep =
+      depths(least_heights(a, bare_foot(a), scale), soles_, rest, *pose);
+  for (size_t side = 0; side < 2; ++side)
+    lifts_[side] = std::max(deep[side], kLetDown * lifts_[side]);
+  raise_feet(lifts_, rest, pose);
 }
 
 }  // namespace restage

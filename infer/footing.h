@@ -39,14 +39,16 @@ class Footing {
   /// sole is still above where it belongs, metres (FootLock).
   std::array<double, 2> operator()(const Joints& rest, const Joints& a, double scale,
                                    const std::array<double, 2>& standing, Pose* pose);
-  /// Feet that are under the floor are raised; to be called when the feet are where they stay.
-  void keep_above(const Joints& rest, const Joints& a, double scale, Pose* pose) const;
+  /// Feet that are under the floor are raised at once, and let down again within some frames; to be
+  /// called when the feet are where they stay.
+  void keep_above(const Joints& rest, const Joints& a, double scale, Pose* pose);
   /// The next frame is the first of another sequence.
-  void forget() { raised_.reset(); }
+  void forget() { raised_.reset(), lifts_ = {}; }
 
  private:
   Soles soles_;
-  std::optional<double> raised_;  ///< metres
+  std::optional<double> raised_;      ///< metres
+  std::array<double, 2> lifts_ = {};  ///< of the feet, in the frame before
 };
 
 }  // namespace restage

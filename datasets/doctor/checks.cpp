@@ -121,10 +121,14 @@ void check_source(const std::vector<Mesh>& first_frames, const std::string& wher
   }
 }
 
-void check_target(const Mesh& target, const std::string& where, ExamineOptions options) {
-  if (options.joints && is_mirrored(*options.joints).value_or(false))
+void check_sides(const Joints& joints, const std::string& where) {
+  if (is_mirrored(joints).value_or(false))
     throw InputError(where, "is a mirror image: the joints named left are on the right",
                      "mirror it (x to -x) where it was made, or exchange the names; or {force}");
+}
+
+void check_target(const Mesh& target, const std::string& where, ExamineOptions options) {
+  if (options.joints) check_sides(*options.joints, where);
   options.target = true;
   const Diagnosis d = judge_surface(target, shape_of(target), repeats(target.vertices), options);
   for (const Finding& f : d.findings) {

@@ -116,6 +116,8 @@ using TakeClouds = std::function<std::vector<Points>()>;
 void check_source(const std::vector<Mesh>& first_frames, const std::string& where,
                   const SourceFrame& given = {}, const TakeClouds& take = {});
 void check_target(const Mesh& target, const std::string& where, ExamineOptions options = {});
+/// InputError for joints whose left is on the right.
+void check_sides(const Joints& joints, const std::string& where);
 
 /// What check_source() says of the up axis, of a second person and of floors, for a source that
 /// comes cloud by cloud.

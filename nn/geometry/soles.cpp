@@ -1,6 +1,7 @@
 #include "nn/geometry/soles.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "nn/geometry/contact.h"
 #include "nn/geometry/skinning.h"
@@ -60,12 +61,28 @@ std::array<double, 2> Soles::lowest(const PosedSkeleton& posed) const {
   return out;
 }
 
-void keep_above(const std::array<double, 2>& floor, const Soles& soles, const Joints& rest,
-                Pose* pose) {
-  const std::array<double, 2> lowest = soles.lowest(forward_kinematics(rest, *pose));
-  for (size_t side = 0; side < 2; ++side)
-    if (const double depth = floor[side] - lowest[side]; depth > 0)
-      move_foot(rest, static_cast<int>(side), Vec3(0, depth, 0), pose);
+std::array<double, 2> depths(const std::array<double, 2>& floor, const Soles& soles,
+                             const Joints& rest, const Pose& pose) {
+  const std::array<double, 2> lowest = soles.lowest(forward_kinematics(rest, pose));
+  return {std::max(0.0, floor[0] - lowest[0]), std::max(0.0, floor[1] - lowest[1])};
+}
+
+double most_lift(const Joints& rest, int side, const Pose& pose) {
+  constexpr double kFolded = 0.45;  // hip to ankle, of the leg
+  const Joints joints = forward_kinematics(rest, pose).joints;
+  const auto of = [&](int j) { return joints[static_cast<size_t>(j + side)]; };
+  const Vec3 leg = of(7) - of(1);
+  const double least = kFolded * ((of(4) - of(1)).norm() + (of(7) - of(4)).norm());
+  const double beside = std::hypot(leg.x(), leg.z());
+  if (beside >= least) return std::max(0.0, -leg.y());
+  return std::max(0.0, -leg.y() - std::sqrt(least * least - beside * beside));
+}
+
+void raise_feet(const std::array<double, 2>& by, const Joints& rest, Pose* pose) {
+  for (int side = 0; side < 2; ++side)
+    if (const double lift = std::min(by[static_cast<size_t>(side)], most_lift(rest, side, *pose));
+        lift > 0)
+      move_foot(rest, side, Vec3(0, lift, 0), pose);
 }
 
 }  // namespace restage

@@ -33,9 +33,13 @@ class Soles {
   std::array<std::vector<Spot>, 2> feet_;
 };
 
-/// Raises each foot whose sole lies under `floor` (heights for left and right, metres): hip and
-/// knee give way, the foot keeps its orientation.
-void keep_above(const std::array<double, 2>& floor, const Soles& soles, const Joints& rest,
-                Pose* pose);
+/// How far each sole lies under `floor` (heights for left and right), metres; 0: it does not.
+std::array<double, 2> depths(const std::array<double, 2>& floor, const Soles& soles,
+                             const Joints& rest, const Pose& pose);
+/// How far a foot can be raised before its knee is folded, metres.
+double most_lift(const Joints& rest, int side, const Pose& pose);
+/// Raises the feet, each as far as its knee lets it: hip and knee give way, the foot keeps its
+/// orientation.
+void raise_feet(const std::array<double, 2>& by, const Joints& rest, Pose* pose);
 
 }  // namespace restage

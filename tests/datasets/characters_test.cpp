@@ -3,7 +3,10 @@
 #include <gtest/gtest.h>
 
 #include "datasets/characters/gltf_clip.h"
+#include "datasets/characters/gltf_document.h"
 #include "datasets/importers/rigs/gltf_character.h"
+#include "infer/writers/glb.h"
+#include "nn/geometry/skinning.h"
 #include "tests/datasets/gltf_maker.h"
 #include "tests/datasets/importers_support.h"
 
@@ -118,7 +121,9 @@ TEST_F(Characters, BonesThatHangElsewhereGoWithTheBody) {
     const std::string in = write("in.glb", CharacterMaker(known_, style).parts);
     const std::string bones = dir.write("names.yaml", testing::bones_yaml(style));
     EXPECT_TRUE(read_target(in, bones).own);
-    if (!style.hung.count(4)) EXPECT_TRUE(read_target(in).own) << read_target(in).unknown_rig;
+    if (style.hung.count(4) == 0) {
+      EXPECT_TRUE(read_target(in).own) << read_target(in).unknown_rig;
+    }
     expect_played(in, performed(in, dir / "out.glb", {}, bones), bones);
   }
 }
@@ -134,11 +139,125 @@ TEST_F(Characters, ATrunkBesideItsLegsIsMovedByWhatCarriesBoth) {
   expect_played(in, performed(in, dir / "out.glb"));
 }
 
+TEST_F(Characters, APelvisThatIsNamedBesideTheLegsIsMovedByWhatCarriesBoth) {
+  // Body carries the thighs and Hips, and is named for nothing.
+  RigStyle style = testing::plain_style();
+  style.names[0] = "Body";
+  style.names[3] = "Hips";
+  const std::string in = write("in.glb", CharacterMaker(known_, style).parts);
+  std::string bones = testing::bones_yaml(style);
+  const auto change = [&](const std::string& from, const std::string& to) {
+    bones.replace(bones.find(from), from.size(), to);
+  };
+  change("pelvis: \"Body\"", "pelvis: \"Hips\"");
+  change("  spine1: \"Hips\"\n", "");
+  const TargetMesh target = read_target(in, dir.write("names.yaml", bones));
+  ASSERT_TRUE(target.own);
+  Joints joints;
+  Points vertices;
+  Pose stands;
+  stands.local.fill(Mat3::Identity());
+  stands.root = target.own->rest()[kPelvis];
+  target.own->place(stands, nullptr, &joints, &vertices);
+  for (size_t v = 0; v < vertices.size(); ++v)
+    ASSERT_LT((vertices[v] - target.own->mesh().vertices[v]).norm(), 1e-5) << v;
+  for (size_t f = 0; f < kFrames; ++f) {
+    const Pose now = pose(f);
+    target.own->place(now, nullptr, &joints, &vertices);
+    EXPECT_LT((joints[kPelvis] - now.root).norm(), 1e-6) << f;
+  }
+}
+
+/// Toes and fingers on the armature, which nobody names.
+TEST_F(Characters, WhatMovesVerticesIsNeverLeftBehind) {
+  RigStyle style = testing::mixamo_style();
+  const std::string whole = write("whole.glb", CharacterMaker(known_, style).parts);
+  style.hung = {{10, -1}, {11, -1}};
+  const std::string in = write("in.glb", CharacterMaker(known_, style).parts);
+  const TargetMesh target = read_target(in), other = read_target(whole);
+  ASSERT_TRUE(target.own && other.own);
+  for (size_t f = 0; f < kFrames; ++f) {
+    Pose now = pose(f);
+    now.local[10] = now.local[11] = Mat3::Identity();  // toes that were not found do not turn
+    Joints joints;
+    Points got, wanted;
+    target.own->place(now, nullptr, &joints, &got);
+    other.own->place(now, nullptr, &joints, &wanted);
+    for (size_t v = 0; v < got.size(); ++v) ASSERT_LT((got[v] - wanted[v]).norm(), 1e-4) << f;
+  }
+}
+
 TEST_F(Characters, RigidPartsAreDrivenByTheirNodes) {
   RigStyle style = testing::mixamo_style();
   style.rigid = true;
   const std::string in = write("in.glb", CharacterMaker(known_, style).parts);
   expect_played(in, performed(in, dir / "out.glb"));
+}
+
+/// A mesh without bones, shown by two nodes, one of which is moved.
+GlbParts bare(const testing::KnownCharacter& known) {
+  GlbParts parts = CharacterMaker(known, testing::plain_style()).parts;
+  parts.root.erase("skins");
+  parts.root.erase("animations");
+  GltfJson& attributes = parts.root["meshes"][0]["primitives"][0]["attributes"];
+  attributes.erase("JOINTS_0");
+  attributes.erase("WEIGHTS_0");
+  std::vector<float> uvs(2 * known.body.rest.vertices.size(), 0.25f);
+  attributes["TEXCOORD_0"] = parts.floats(uvs, "VEC2", 2);
+  parts.root["materials"] = {{{"name", "Cloth"}}};
+  parts.root["meshes"][0]["primitives"][0]["material"] = 0;
+  parts.root["nodes"] = {{{"name", "Body"}, {"mesh", 0}},
+                         {{"name", "Holder"}, {"translation", {0.1, 0, 0}}, {"children", {2}}},
+                         {{"name", "Twin"}, {"mesh", 0}, {"scale", {1.1, 1.1, 1.1}}}};
+  parts.root["scenes"] = {{{"nodes", {0, 1}}}};
+  return parts;
+}
+
+TEST_F(Characters, BareMeshesKeepWhatTheyHaveAndGetBones) {
+  const GlbParts parts = bare(known_);
+  const std::string in = write("in.glb", parts), content = parts.glb();
+  const Gltf file = parse_gltf(content, in);
+  const Mesh mesh = gltf_mesh(file, gltf_rest(file));
+  const size_t half = known_.body.rest.vertices.size();
+  ASSERT_EQ(mesh.vertices.size(), 2 * half);
+  SkinWeights weights(2 * half, kJoints);
+  weights << known_.body.weights, known_.body.weights;
+  GlbWriter ours("ours.glb", mesh, known_.body.joints, weights);
+  for (size_t f = 0; f < kFrames; ++f) ours.push(pose(f), 0.5);
+  for (const char* name : {"out.glb", "out.gltf"}) {
+    GltfDocument document(content, in);
+    document.wear(ours.bytes(), file);
+    document.write(dir / name);
+    const Gltf out = read_gltf(dir / name);
+    const GltfClip& clip = find_clip(out, "motion");
+    for (size_t f = 0; f < kFrames; ++f) {
+      const Mesh shown = gltf_mesh(out, gltf_pose(out, clip, static_cast<double>(f) / kFps));
+      ASSERT_EQ(shown.vertices.size(), mesh.vertices.size());
+      const PosedSkeleton posed = forward_kinematics(known_.body.joints, pose(f));
+      double off = 0;
+      for (size_t v = 0; v < mesh.vertices.size(); ++v)
+        off = std::max(off, (shown.vertices[v].cast<double>() -
+                             blend(mesh.vertices[v].cast<double>(),
+                                   weights.row(static_cast<Eigen::Index>(v)).data(),
+                                   known_.body.joints, posed))
+                                .norm());
+      EXPECT_LT(off, 1e-4) << name << ", frame " << f;
+    }
+  }
+  const auto [before, binary] = parts_of(content);
+  const auto [after, longer] = parts_of(bytes_of(dir / "out.glb"));
+  EXPECT_EQ(longer.substr(0, parts.binary.size()), parts.binary);
+  EXPECT_EQ(after["materials"], before["materials"]);
+  for (const size_t mesh_number : {size_t{0}, size_t{1}}) {
+    const GltfJson& part = after["meshes"][mesh_number]["primitives"][0];
+    for (const char* name : {"POSITION", "TEXCOORD_0"})
+      EXPECT_EQ(part["attributes"][name], before["meshes"][0]["primitives"][0]["attributes"][name]);
+    EXPECT_TRUE(part["attributes"].contains("JOINTS_0"));
+    EXPECT_EQ(part["indices"], before["meshes"][0]["primitives"][0]["indices"]);
+  }
+  EXPECT_NE(after["meshes"][0]["primitives"][0]["attributes"]["JOINTS_0"],
+            after["meshes"][1]["primitives"][0]["attributes"]["JOINTS_0"]);
+  EXPECT_FALSE(after["nodes"][2].contains("mesh")) << "a skin ignores where its node is";
 }
 
 TEST_F(Characters, WhatWouldBeTornIsRefused) {

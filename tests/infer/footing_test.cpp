@@ -86,7 +86,7 @@ TEST(Footing, NoFootGoesBelowTheFloor) {
   Pose pose = at_rest(body.joints);
   pose.root.y() -= 0.1;
   const PosedSkeleton before = forward_kinematics(body.joints, pose);
-  keep_above({0, -1}, soles, body.joints, &pose);
+  raise_feet(depths({0, -1}, soles, body.joints, pose), body.joints, &pose);
   const PosedSkeleton after = forward_kinematics(body.joints, pose);
   EXPECT_NEAR(soles.lowest(after)[0], 0, 0.01);
   EXPECT_NEAR(soles.lowest(after)[1], soles.lowest(before)[1], 0.005) << "its floor is lower";

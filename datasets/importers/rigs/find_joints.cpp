@@ -287,6 +287,7 @@ class Finder {
       out_.bones[segments[0].joint] = limb.upper;
       out_.bones[segments[1].joint] = limb.lower;
       out_.bones[segments[2].joint] = limb.end;
+      if (!hangs_on(skeleton_, limb.end, limb.lower)) apart_.push_back(limb.end);
       return;
     }
     bool all = true;
@@ -497,6 +498,9 @@ class Finder {
     for (const int j : {1, 4, 7, 10, 13, 16, 18, 20}) {
       const int left = out_.bones[j], right = out_.bones[j + 1];
       if (j == 10 && (left < 0 || right < 0)) continue;  // a toe may be the ankle's end
+      const auto is_apart = [&](int b) { return std::count(apart_.begin(), apart_.end(), b) > 0; };
+      if (is_apart(left) || is_apart(right)) continue;  // found where it lies
+      if (j == 10 && (is_apart(out_.bones[7]) || is_apart(out_.bones[8]))) continue;
       bool alike = (left < 0) == (right < 0) && steps(left, top) == steps(right, top);
       if (alike && j == 10)
         alike = plain_cost(left) == plain_cost(right) &&
@@ -537,6 +541,7 @@ class Finder {
   const std::vector<BoneWords>& words_;
   const int top_;
   FoundJoints out_;
+  std::vector<int> apart_;  // ends of limbs that hang elsewhere
 };
 
 }  // namespace

@@ -126,6 +126,20 @@ std::vector<int> rigid_parts(const Gltf& file) {
   return {out.begin(), out.end()};
 }
 
+/// Whether the parts are a body's: they hang on six of the 22 joints or more. Bones beside a mesh
+/// that hangs on none of them move nothing.
+bool moves_as_parts(const Gltf& file, const GltfRig& rig, const std::vector<int>& parts) {
+  constexpr size_t kFewest = 6;
+  std::set<int> joints;
+  for (const int n : parts)
+    for (int b = n; b >= 0; b = file.nodes[static_cast<size_t>(b)].parent)
+      if (b == rig.hips || std::find(rig.node.begin(), rig.node.end(), b) != rig.node.end()) {
+        joints.insert(rig.joint[static_cast<size_t>(n)]);
+        break;
+      }
+  return joints.size() >= kFewest;
+}
+
 std::string words_of(const Gltf& file, const std::vector<int>& parts) {
   constexpr size_t kLongList = 80;  // bytes
   std::vector<std::string> names;
@@ -232,14 +246,14 @@ TargetMesh read_target(const std::string& path, const std::string& bones) {
   try {
     if (out.rigged || parts.size() > 1) {
       rig = find_rig(file, options, out.report);
-      out.rigged = true;
+      out.rigged = out.rigged || moves_as_parts(file, rig, parts);
     }
   } catch (const UnknownSkeleton& error) {
     if (!bones.empty()) throw;
     if (out.rigged)
       out.unknown_rig = error.reason;
     else
-      out.parts = words_of(file, parts);
+      out.parts = words_of(file, parts), out.unknown_parts = error.reason;
   }
   if (!out.rigged || !out.unknown_rig.empty()) {
     out.report.remark(!out.rigged

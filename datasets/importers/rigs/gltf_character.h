@@ -46,7 +46,9 @@ struct TargetMesh {
   std::shared_ptr<const GltfOwnRig> own;  ///< of a known rig: it poses the mesh itself
   bool rigged = false;                    ///< it has a rig, known or not
   std::string unknown_rig;  ///< why the joints of a rig were not found; empty: they were
-  std::string parts;  ///< of a file without skin and bones, which meshes it is made of; else empty
+  /// Of a file without a skin which meshes it is made of, and why its nodes are no body's; else
+  /// empty.
+  std::string parts, unknown_parts;
   /// What the doctor need not guess of it.
   ExamineOptions known() const;
 };

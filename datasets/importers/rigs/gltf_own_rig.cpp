@@ -39,6 +39,8 @@ GltfOwnRig::GltfOwnRig(Gltf file, GltfRig rig) : file_(std::move(file)), rig_(st
   // A first spine bone that carries the legs turns with the pelvis, or the legs would be moved.
   for (const int node : {rig_.node[kPelvis], rig_.hips})
     joint_of_[static_cast<size_t>(node)] = kPelvis;
+  for (const int node : rig_.strays)
+    joint_of_[static_cast<size_t>(node)] = rig_.joint[static_cast<size_t>(node)];
   finger_of_.assign(file_.nodes.size(), -1);
   const FingerBones fingers = rig_fingers(file_, rig_);
   for (size_t k = 0; k < fingers.size(); ++k)
@@ -80,7 +82,7 @@ GltfTransforms GltfOwnRig::world(const Pose* pose, const FingerTurns* fingers,
     }
     const bool hips = pose != nullptr && at == rig_.hips, loose = rig_.carrier[n] != node.parent;
     if (hips)
-      moved.translation = parent.inverse() * Vec3(rig_.turn.transpose() * pose->root / rig_.scale);
+      moved.translation = parent.inverse() * hips_place(*pose);
     else if (loose)
       moved.translation = parent.inverse() * carried(out, n);
     if (turns != nullptr && (hips || loose))
@@ -88,6 +90,13 @@ GltfTransforms GltfOwnRig::world(const Pose* pose, const FingerTurns* fingers,
     out[n] = parent * moved.local();
   }
   return out;
+}
+
+/// Where the node that is moved has to be for the pelvis to lie where the pose says.
+Vec3 GltfOwnRig::hips_place(const Pose& pose) const {
+  const Vec3 pelvis = rig_.turn.transpose() * pose.root / rig_.scale;
+  if (rig_.hips != rig_.node[kPelvis]) return pelvis;
+  return pelvis - rig_.turn.transpose() * pose.local[kPelvis] * rig_.turn * rig_.offset[kPelvis];
 }
 
 /// Where the node's carrier takes it.
@@ -106,6 +115,11 @@ void GltfOwnRig::check_joined(const Joints& joints) const {
     auto p = static_cast<size_t>(kParents[j]);
     while (p > 0 && !rig_.offset[p].isZero()) p = static_cast<size_t>(kParents[p]);
     if (!rig_.offset[j].isZero() || !rig_.offset[p].isZero()) continue;
+    // What hangs on its neighbour, or is carried by it, can only be stretched, by uneven scales.
+    bool joined = false;
+    for (int n = rig_.node[j]; n >= 0 && !joined; n = file_.nodes[static_cast<size_t>(n)].parent)
+      joined = n == rig_.node[p] || rig_.carrier[static_cast<size_t>(n)] == rig_.node[p];
+    if (joined) continue;
     const double rest = (rest_[j] - rest_[p]).norm(), now = (joints[j] - joints[p]).norm();
     if (std::abs(now - rest) < kTorn * rest_[kHead].y()) continue;
     const auto name = [&](size_t k) {

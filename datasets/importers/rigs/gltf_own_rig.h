@@ -54,6 +54,7 @@ class GltfOwnRig final : public OwnRig {
   std::optional<Mat3> turn_of(size_t node, const Rotations& global,
                               const FingerTurns* fingers) const;
   Vec3 joint_at(const GltfTransforms& world, size_t j) const;
+  Vec3 hips_place(const Pose& pose) const;
   Vec3 carried(const GltfTransforms& world, size_t node) const;
   void check_joined(const Joints& joints) const;
 

@@ -2,10 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
 #include <optional>
 
 #include "autograd/base/format.h"
+#include "datasets/importers/rigs/carriers.h"
 #include "datasets/readers/errors.h"
 #include "datasets/readers/text/text.h"
 #include "datasets/readers/text/word_lines.h"
@@ -304,62 +304,6 @@ GltfTransforms turned(const Gltf& file, const GltfRig& rig,
         p < 0 ? at : Vec3(out[p].translation() + by[p] * (at - rig.bind[p].translation()));
   }
   return out;
-}
-
-/// Whether a joint would be left behind if it moved with its nearest joint in the file, `nearest`,
-/// and not with the one above it in the body, `above`. Trunks are built in many ways: what hangs on
-/// another bone of the spine hangs well enough.
-bool left_behind(int above, int nearest) {
-  const auto upper_trunk = [](int j) {
-    return j == kSpine1 || j == kSpine2 || j == kSpine3 || (j >= 12 && j <= 14);
-  };
-  return nearest != above && !(upper_trunk(above) && nearest >= 0 && upper_trunk(nearest));
-}
-
-/// GltfRig::carrier and order.
-void find_carriers(const Gltf& file, GltfRig& rig, const std::vector<int>& owner,
-                   ImportReport& report) {
-  const size_t count = file.nodes.size();
-  rig.carrier.resize(count);
-  for (size_t n = 0; n < count; ++n) rig.carrier[n] = file.nodes[n].parent;
-  const auto own = [&](int j) {  // a node turns with it, and it lies there
-    const auto n = static_cast<size_t>(rig.node[static_cast<size_t>(j)]);
-    return owner[n] == j && rig.offset[static_cast<size_t>(j)].isZero();
-  };
-  std::vector<std::string> words;
-  for (int j = 1; j < kJoints; ++j) {
-    if (!own(j)) continue;
-    int above = kParents[j];
-    while (above > 0 && !own(above)) above = kParents[above];
-    const int node = rig.node[static_cast<size_t>(j)];
-    int nearest = file.nodes[static_cast<size_t>(node)].parent;
-    while (nearest >= 0 && nearest != rig.hips && owner[static_cast<size_t>(nearest)] < 0)
-      nearest = file.nodes[static_cast<size_t>(nearest)].parent;
-    const int joint = nearest < 0           ? -1
-                      : nearest == rig.hips ? kPelvis
-                                            : owner[static_cast<size_t>(nearest)];
-    if (!left_behind(above, joint)) continue;
-    rig.carrier[static_cast<size_t>(node)] = rig.node[static_cast<size_t>(above)];
-    words.push_back(
-        text::quote(file.nodes[static_cast<size_t>(node)].name) + " goes with " +
-        text::quote(file.nodes[static_cast<size_t>(rig.node[static_cast<size_t>(above)])].name));
-  }
-  if (!words.empty()) report.fact("bones that hang elsewhere", joined(words));
-  std::vector<int> state(count);  // 1: being placed, 2: placed
-  const std::function<void(int)> place = [&](int n) {
-    if (n < 0 || state[static_cast<size_t>(n)] == 2) return;
-    if (state[static_cast<size_t>(n)] == 1)
-      throw InputError(file.path,
-                       "bone " + text::quote(file.nodes[static_cast<size_t>(n)].name) +
-                           " hangs on a bone that would have to go with it",
-                       "name other bones with {bones} names.yaml");
-    state[static_cast<size_t>(n)] = 1;
-    place(file.nodes[static_cast<size_t>(n)].parent);
-    place(rig.carrier[static_cast<size_t>(n)]);
-    state[static_cast<size_t>(n)] = 2;
-    rig.order.push_back(n);
-  };
-  for (size_t n = 0; n < count; ++n) place(static_cast<int>(n));
 }
 
 void find_nodes(const Gltf& file, GltfRig& rig, const NamedJoints& names,

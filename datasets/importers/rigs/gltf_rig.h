@@ -22,6 +22,7 @@ struct GltfRig {
   /// bone above it in the body moves with that one all the same: feet and hands that hang on the
   /// armature, as goals of the maker's IK; thighs that hang on a root.
   std::vector<int> carrier;
+  std::vector<int> strays;       ///< such nodes that are none of the 22 joints
   std::vector<int> order;        ///< all nodes, parents and carriers first
   double scale = 1;              ///< metres per unit
   Mat3 turn = Mat3::Identity();  ///< to y up, facing +z

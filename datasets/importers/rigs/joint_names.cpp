@@ -370,15 +370,29 @@ const Profile& no_profile() {
 }
 
 /// The pelvis turns with the lowest bone that carries both legs, if that hangs on it: the first of
-/// the spine in 3ds Max, Daz's `pelvis` below `hip`.
+/// the spine in 3ds Max, Daz's `pelvis` below `hip`. Where the legs hang beside it, on a bone that
+/// carries both and lies nearer to it than the knees do, that one is moved.
 NamedJoints turned_with_legs(const SourceSkeleton& skeleton, NamedJoints names) {
   SourceJoint& pelvis = names.map[kPelvis];
   names.hips = pelvis.joint;
   const int legs = carrier_of(skeleton, names.map[kLeftHip].joint, names.map[kRightHip].joint);
-  if (legs <= pelvis.joint || !hangs_on(skeleton, legs, pelvis.joint)) return names;
   const std::vector<Vec3> zero = zero_positions(skeleton);
-  pelvis.offset += zero[pelvis.joint] - zero[legs];
-  pelvis.joint = legs;
+  const auto take = [&](int bone) {
+    pelvis.offset += zero[static_cast<size_t>(pelvis.joint)] - zero[static_cast<size_t>(bone)];
+    pelvis.joint = bone;
+  };
+  if (legs > pelvis.joint && hangs_on(skeleton, legs, pelvis.joint)) {
+    take(legs);
+  } else if (legs > 0 && legs != pelvis.joint && hangs_on(skeleton, pelvis.joint, legs)) {
+    const auto away = [&](int bone) {
+      return (zero[static_cast<size_t>(bone)] - zero[static_cast<size_t>(names.hips)]).norm();
+    };
+    if (away(legs) <
+        std::min(away(names.map[kLeftKnee].joint), away(names.map[kRightKnee].joint))) {
+      take(legs);
+      names.hips = legs;
+    }
+  }
   return names;
 }
 

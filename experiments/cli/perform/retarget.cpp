@@ -57,8 +57,9 @@ auto with_target(const RetargetCommand& c, const TargetMesh& target, const Work&
     if (!target.parts.empty())
       throw InputError(
           c.target,
-          cat("has no skin and no bones, but ", target.parts, ", and as one mesh ", error.cause()),
-          "bind its parts to a skeleton in the program that made them, and export again");
+          cat("has no skin, and its ", target.parts, " are no body's: ", target.unknown_parts),
+          "bind them to a skeleton in the program that made them, or name their nodes with "
+          "--bones");
     if (target.unknown_rig.empty()) throw;
     throw InputError(
         c.target, "it would be posed by its rig, which was not recognised: " + target.unknown_rig,
@@ -394,6 +395,7 @@ void check_kept(const RetargetCommand& c, const TargetMesh& target) {
 
 void check_mesh(const RetargetCommand& c, const TargetMesh& target) {
   if (c.options.force) return;
+  if (target.own) return check_sides(*target.joints, c.target);  // its rig says all else
   with_target(c, target, [&] { check_target(target.mesh, c.target, target.known()); });
 }
 

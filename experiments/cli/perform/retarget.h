@@ -62,8 +62,8 @@ void check_mesh(const RetargetCommand& c, const TargetMesh& target);
 SystemInput load_input(const RetargetCommand& c, const Common& common);
 /// The same with the target; what is refused because its rig is not known says so.
 std::unique_ptr<System> system_for(const RetargetCommand& c, SystemInput input, TargetMesh& target);
-/// Whether feet are put on the floor: unless something else is asked for, of every target but a bare
-/// mesh whose result is numbers, which may be measured.
+/// Whether feet are put on the floor: unless something else is asked for, of every target but a
+/// bare mesh whose result is numbers, which may be measured.
 bool floor_is_on(const RetargetCommand& c, const TargetMesh& target);
 /// Where frames go, and which joints the target's are: its rig's, those of --rest, else those of
 /// the weights. InputError: they cannot be converted to --joints, or --rest holds others than the

@@ -1,5 +1,6 @@
 // restage retarget of a source that has a skeleton: BVH, AMC, glTF, VRM animations, AMASS, motions.
 #include "autograd/base/log.h"
+#include "datasets/benchmark/floor.h"
 #include "datasets/doctor/examine.h"
 #include "datasets/importers/motions/skeleton_take.h"
 #include "datasets/readers/errors.h"
@@ -92,7 +93,8 @@ TakeOptions options_of(const RetargetCommand& c, const Joints& performer) {
   return out;
 }
 
-/// Keeps the feet of a target above the floor that performs another's motion.
+/// Keeps the feet of a target above the floor that performs another's motion: before a foot would
+/// go below it, the foot is raised, and later let down. What a knee cannot give, the pelvis does.
 class Floor {
  public:
   Floor(const SkeletonTake& take, const Shown& shown)
@@ -111,16 +113,50 @@ class Floor {
         return true;
     return false;
   }
+
+  /// Looks at the whole take.
+  void prepare() {
+    const FlatFoot flat = flat_foot(take_.rest);
+    std::array<std::vector<double>, 2> lifts;
+    std::vector<double> raised;
+    for (size_t f = 0; f < take_.frames.size(); ++f) {
+      const Pose pose = perform_take(take_, f, rest_);
+      const auto deep =
+          depths(least_heights(take_.frames[f].joints, flat, scale_), soles_, rest_, pose);
+      raised.push_back(0);
+      for (int side = 0; side < 2; ++side) {
+        const double by = deep[static_cast<size_t>(side)], most = most_lift(rest_, side, pose);
+        lifts[static_cast<size_t>(side)].push_back(std::min(by, most));
+        raised.back() = std::max(raised.back(), by - most);
+      }
+    }
+    raised_ = smooth_over(std::move(raised));
+    for (size_t side = 0; side < 2; ++side) lifts_[side] = smooth_over(std::move(lifts[side]));
+  }
+
   void operator()(size_t frame, Pose* pose) const {
-    keep_above(least_heights(take_.frames[frame].joints, flat_foot(take_.rest), scale_), soles_,
+    pose->root.y() += raised_[frame];
+    raise_feet({std::max(0.0, lifts_[0][frame] - raised_[frame]),
+                std::max(0.0, lifts_[1][frame] - raised_[frame])},
                rest_, pose);
   }
 
  private:
+  /// A smooth curve on or above the values.
+  static std::vector<double> smooth_over(std::vector<double> values) {
+    constexpr size_t kHalf = 4;  // frames
+    for (double& x : values) x = -x;
+    std::vector<double> out = lower_envelope(values, kHalf);
+    for (double& x : out) x = -x;
+    return out;
+  }
+
   const SkeletonTake& take_;
   const Joints& rest_;
   double scale_;
   Soles soles_;
+  std::array<std::vector<double>, 2> lifts_;
+  std::vector<double> raised_;
 };
 
 }  // namespace
@@ -159,7 +195,8 @@ Retargeted run_take(const RetargetCommand& c, const Common& common, const Retarg
   say_target(target);
   std::optional<Floor> floor;
   if (floor_is_on(c, target) && shown.rig != nullptr) floor.emplace(take, shown);
-  if (floor && !floor->is_needed()) floor.reset();
+  if (floor && c.floor.empty() && !floor->is_needed()) floor.reset();
+  if (floor) floor->prepare();
   int64_t frames = 0;
   for (size_t f = 0; f < take.frames.size(); f += static_cast<size_t>(c.to.every)) {
     caller.look();

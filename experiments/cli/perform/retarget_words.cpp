@@ -46,8 +46,9 @@ void say_target(const TargetMesh& target) {
   }
   const Gltf& file = target.own->file();
   std::string line = file.standard.empty() ? "" : file.standard + ", ";
-  line += cat(family(report), " (", skin_joints(file), "), ", rest_pose(report), ", ",
-              counted(file.meshes, "mesh", "meshes"));
+  line +=
+      cat(family(report), " (", file.skin_nodes.empty() ? "rigid parts" : cat(skin_joints(file)),
+          "), ", rest_pose(report), ", ", counted(file.meshes, "mesh", "meshes"));
   if (file.morph_targets > 0) line += ", " + counted(file.morph_targets, "morph target");
   say(line, report);
 }

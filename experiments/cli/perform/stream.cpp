@@ -392,7 +392,8 @@ void add_stream(Program& program) {
       "--source-up z --scale mm --vmc 39539\n"
       "restage stream --target hero.ply --source tcp://0.0.0.0:9000 --vmc 192.168.0.7:39539 --ws "
       "0.0.0.0:8080 --samples 1 --min-confidence 0.5\n"
-      "restage stream --target hero.glb --source captured/ --vmc 39539 --anchor 0 --no-foot-lock "
+      "restage stream --target hero.glb --source captured/ --vmc 39539 --anchor 0 --floor off "
+      "--no-foot-lock "
       "--no-steady-bones --no-keep-limbs --force --device cuda\n"
       "restage stream --target hero.ply --system register --rest rest.h5 --source captured/ --vmc "
       "39539",
