@@ -144,7 +144,7 @@ class Floor {
  private:
   /// A smooth curve on or above the values.
   static std::vector<double> smooth_over(std::vector<double> values) {
-    constexpr size_t kHalf = 4;  // frames
+    constexpr size_t kHalf = 2;  // frames
     for (double& x : values) x = -x;
     std::vector<double> out = lower_envelope(values, kHalf);
     for (double& x : out) x = -x;
