@@ -10,7 +10,7 @@ namespace {
 
 constexpr double kStands = 0.5;    // a foot with a greater chance stands
 constexpr double kSettling = 0.2;  // seconds
-constexpr double kLetDown = 0.5;  // of a lift is left in the next frame
+constexpr double kLetDown = 0.5;   // of a lift is left in the next frame
 
 // In units of the leg, hip to ankle: how far a foot that is on the floor may be from standing flat,
 // and one that is elsewhere has to be.
