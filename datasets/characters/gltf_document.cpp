@@ -166,8 +166,15 @@ void GltfDocument::append(const Clip& clip) {
 
 namespace {
 
+bool stands_still(const GltfNode& node) {
+  return node.parent < 0 && node.translation.isZero(0) && node.scale == Vec3::Ones() &&
+         node.rotation.coeffs() == Quat::Identity().coeffs();
+}
+
+}  // namespace
+
 /// What GlbWriter made: its document, and the bytes of its accessors.
-struct Worn {
+struct GltfDocument::Worn {
   Json json;
   std::string binary;
 
@@ -182,13 +189,6 @@ struct Worn {
                                            view["byteLength"].get<size_t>());
   }
 };
-
-bool stands_still(const GltfNode& node) {
-  return node.parent < 0 && node.translation.isZero(0) && node.scale == Vec3::Ones() &&
-         node.rotation.coeffs() == Quat::Identity().coeffs();
-}
-
-}  // namespace
 
 /// Puts parts of another document into this one.
 class GltfDocument::Tailor {

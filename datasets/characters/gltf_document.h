@@ -50,6 +50,7 @@ class GltfDocument {
 
  private:
   struct State;
+  struct Worn;
   class Tailor;
   std::unique_ptr<State> state_;
 };
