@@ -12,8 +12,8 @@ namespace restage {
 /// the pelvis keeps its path. While the foot stands, the place moves towards where the network puts
 /// the foot, by a fiftieth of the distance in every frame. Once the foot is lifted, or the network
 /// puts the foot more than 6 cm away from the place, the distance shrinks by a quarter in every
-/// frame. Upwards and downwards a foot is not held where it landed, but brought to where its sole
-/// belongs, by a quarter of the way in every frame.
+/// frame. If it is known where the soles belong, a foot is not held at the height at which it
+/// landed: it goes a quarter of the way to its place on the floor in every frame.
 class FootLock {
  public:
   /// Changes `pose`, the network's, for the next frame. `rest`: rest joints of the body.

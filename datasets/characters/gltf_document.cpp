@@ -207,8 +207,9 @@ class GltfDocument::Tailor {
     std::map<size_t, int> wearers;  // of a mesh
     for (const auto& [node, parts] : of_node) dress(node, parts, wearers);
     add_animation();
-    for (const auto& [key, value] : worn_.json["asset"]["extras"].items())
-      s_.json["asset"]["extras"][key] = value;
+    Json& extras = s_.json["asset"]["extras"];
+    if (!extras.is_null() && !extras.is_object()) extras = {{"before", extras}};
+    for (const auto& [key, value] : worn_.json["asset"]["extras"].items()) extras[key] = value;
     if (s_.has_binary)
       s_.json["buffers"][0]["byteLength"] = s_.binary.size();
     else
@@ -292,6 +293,8 @@ class GltfDocument::Tailor {
     for (const GltfPart& part : parts) {
       Json& attributes =
           s_.json["meshes"].at(mesh).at("primitives").at(part.primitive)["attributes"];
+      for (int set = 1; attributes.erase(cat("JOINTS_", set)) > 0; ++set)  // of a skin that is gone
+        attributes.erase(cat("WEIGHTS_", set));
       for (const char* name : {"JOINTS_0", "WEIGHTS_0"})
         attributes[name] = rows(ours[name].get<size_t>(), part.first, part.count);
     }

@@ -18,12 +18,6 @@ bool left_behind(int above, int nearest) {
   return nearest != above && !(upper_trunk(above) && nearest >= 0 && upper_trunk(nearest));
 }
 
-bool is_below(const Gltf& file, int node, int above) {
-  for (int n = node; n >= 0; n = file.nodes[static_cast<size_t>(n)].parent)
-    if (n == above) return true;
-  return false;
-}
-
 /// Nodes that move vertices and hang on none of the joints, with the joint that lies nearest: toes,
 /// fingers, goals that hang on the armature. What lies far from all joints is somebody else's.
 std::vector<std::pair<int, int>> find_strays(const Gltf& file, const GltfRig& rig,
@@ -118,15 +112,20 @@ void find_carriers(const Gltf& file, GltfRig& rig, const std::vector<int>& owner
         text::quote(file.nodes[static_cast<size_t>(node)].name) + " goes with " +
         text::quote(file.nodes[static_cast<size_t>(rig.node[static_cast<size_t>(above)])].name));
   }
+  std::vector<bool> stray(count);
   for (const auto& [node, joint] : find_strays(file, rig, owner)) {
     const auto n = static_cast<size_t>(node);
     rig.carrier[n] = rig.node[static_cast<size_t>(joint)];
     rig.strays.push_back(node);
     words.push_back(cat(text::quote(file.nodes[n].name), " goes with the ", kJointNames[joint]));
-    for (size_t below = n; below < count; ++below)  // parents come first
-      if (below == n || (rig.joint[below] == 0 && is_below(file, static_cast<int>(below), node)))
-        rig.joint[below] = joint;
+    stray[n] = true;
+    rig.joint[n] = joint;
   }
+  for (size_t n = 0; n < count; ++n)  // parents come first
+    if (const int p = file.nodes[n].parent; p >= 0 && stray[static_cast<size_t>(p)]) {
+      stray[n] = true;
+      rig.joint[n] = rig.joint[static_cast<size_t>(p)];
+    }
   if (!words.empty()) report.fact("bones that hang elsewhere", joined(words));
   order_nodes(file, rig);
 }

@@ -243,17 +243,23 @@ TargetMesh read_target(const std::string& path, const std::string& bones) {
   MotionOptions options;
   options.profile = bones;
   GltfRig rig;
-  try {
-    if (out.rigged || parts.size() > 1) {
+  if (out.rigged) {
+    try {
       rig = find_rig(file, options, out.report);
-      out.rigged = out.rigged || moves_as_parts(file, rig, parts);
-    }
-  } catch (const UnknownSkeleton& error) {
-    if (!bones.empty()) throw;
-    if (out.rigged)
+    } catch (const UnknownSkeleton& error) {
       out.unknown_rig = error.reason;
-    else
-      out.parts = words_of(file, parts), out.unknown_parts = error.reason;
+    }
+  } else if (parts.size() > 1) {
+    try {
+      ImportReport of_parts = out.report;
+      rig = find_rig(file, options, of_parts);
+      out.rigged = moves_as_parts(file, rig, parts);
+      if (out.rigged) out.report = std::move(of_parts);
+    } catch (const InputError& error) {  // a mesh in parts, then
+      if (!bones.empty()) throw;
+      out.parts = words_of(file, parts);
+      out.unknown_parts = error.cause();
+    }
   }
   if (!out.rigged || !out.unknown_rig.empty()) {
     out.report.remark(!out.rigged
