@@ -153,6 +153,7 @@ void Retargeter::forget() {
   state_ = {};
   feet_ = {};
   if (footing_) footing_->forget();
+  hands_moved_.fill(Vec3::Zero());
   bones_ = {};
   waiting_ = {};
   heading_ = Heading(steady_heading_);
@@ -254,6 +255,7 @@ void Retargeter::step(const SeenJoints& now, bool filled, const Show& show) {
     seen = then.seen;
     frame_.filled = then.filled;
     perform(said, seen.joints, then.turn, &frame_.pose);
+    if (options_.contacts) keep_contacts(seen);
   }
   frame_.confidence.reset();
   if (seen.uncertainty) frame_.confidence = frame_.filled ? 0 : confidence(*seen.uncertainty);
@@ -266,6 +268,28 @@ void Retargeter::place(RetargetedFrame& frame) const {
   const PosedSkeleton posed = forward_kinematics(rest_, frame.pose);
   frame.joints = posed.joints;
   if (surface_) (*surface_)(frame.pose, posed, &frame.vertices);
+}
+
+/// A's rotations are taken for B's. A hand whose place is not known to a few centimetres touches
+/// nothing. What hands are moved by follows within some frames: joints that are seen tremble.
+void Retargeter::keep_contacts(const SeenJoints& a) {
+  constexpr double kSure = 0.025, kUnsure = 0.06;  // metres
+  constexpr double kFollows = 0.4;                 // of the way in a frame
+  if (!contacts_ && rig() != nullptr)
+    contacts_.emplace(PartSurfaces(target_, rig()->rest, rig()->weights));
+  if (!contacts_) return;
+  std::array<double, 2> sure{1, 1};
+  if (a.uncertainty)
+    for (size_t side = 0; side < 2; ++side)
+      sure[side] =
+          std::clamp((kUnsure - (*a.uncertainty)[kLeftWrist + side]) / (kUnsure - kSure), 0.0, 1.0);
+  PosedSkeleton seen = forward_kinematics(rest_, frame_.pose);
+  seen.joints = a.joints;
+  const std::array<Vec3, 2> wanted =
+      contacts_->moves({*options_.contacts, seen, leg_length(a.joints)}, rest_, frame_.pose, sure);
+  for (size_t side = 0; side < 2; ++side)
+    hands_moved_[side] += kFollows * (wanted[side] - hands_moved_[side]);
+  move_hands(rest_, hands_moved_, &frame_.pose);
 }
 
 /// Lets B wait in a frame without confidence (RetargetOptions::min_confidence). `a`: A's joints in

@@ -5,6 +5,7 @@
 
 #include <optional>
 
+#include "infer/contacts.h"
 #include "infer/foot_lock.h"
 #include "infer/footing.h"
 #include "infer/surface.h"
@@ -39,6 +40,10 @@ struct RetargetOptions {
   /// The soles decide how high B stands, and no foot goes below the floor (infer/footing.h), if the
   /// motion network says which feet stand and the target has a surface.
   bool floor = false;
+  /// Hands touch what A's touch and go through nothing (infer/contacts.h), if the target has a
+  /// surface: the surfaces of an average person whose legs are 1 m long, who stands in for A. Null:
+  /// hands are where the rotations put them.
+  std::shared_ptr<const PartSurfaces> contacts = nullptr;
   /// Legs and arms that cross keep their names (keep_limbs(), nn/models/views.h).
   bool keep_limbs = true;
   /// People of any size are seen in an adult's (nn/models/extraction.h), targets too.
@@ -110,6 +115,7 @@ class Retargeter : public System {
   void perform(const MotionOutput& answer, const Joints& a, const Mat3& turn, Pose* pose);
   void stand(const float* logits, const Joints& a, Pose* pose);
   void hold_doubtful(const Joints& a);
+  void keep_contacts(const SeenJoints& a);
   void sum_path(const Joints& a, const Vec3& velocity);
 
   Bundle models_;
@@ -128,6 +134,8 @@ class Retargeter : public System {
   MotionState state_;
   FootLock feet_;
   std::optional<Footing> footing_;
+  std::optional<Contacts> contacts_;
+  std::array<Vec3, 2> hands_moved_ = {Vec3::Zero(), Vec3::Zero()};  ///< in the frame before
   SteadyBones bones_;
   Waiting waiting_;
   std::optional<Joints> previous_;      ///< A one frame of the grid ago

@@ -96,21 +96,8 @@ RngKey body_key(uint64_t seed, const std::string& split, int index) {
   return RngKey{seed, 0}.fold("builtin.body").fold(split).fold(static_cast<uint64_t>(index));
 }
 
-}  // namespace
-
-Body builtin_body(uint64_t seed, const std::string& split, int index, bool one_mesh) {
-  if (split != "train" && split != "validation" && split != "test")
-    throw InputError("builtin bodies", "unknown split \"" + split + "\"",
-                     "use train, validation or test");
-  if (index < 0)
-    throw InputError("builtin bodies", cat("negative body number ", index), "count from 0");
-  const BodyShape shape = draw_body_shape(body_key(seed, split, index));
-  const ImplicitSurface surface = shape_surface(shape);
-  SurfaceMesh mesh = one_mesh ? average_mesh_on(shape, surface) : mesh_of(shape, surface);
-
+Body body_of(const BodyShape& shape, const ImplicitSurface& surface, SurfaceMesh mesh) {
   Body body;
-  body.id = cat("builtin_", split, "_", index);
-  body.split = split;
   body.weights = shape_weights(shape, mesh);
   double lo = 1e9, hi = -1e9;
   for (const Vec3& v : mesh.vertices) {
@@ -125,6 +112,29 @@ Body builtin_body(uint64_t seed, const std::string& split, int index, bool one_m
   body.definition = "builtin";
   for (Vec3& j : body.joints) j = place(j);
   return body;
+}
+
+}  // namespace
+
+Body builtin_body(uint64_t seed, const std::string& split, int index, bool one_mesh) {
+  if (split != "train" && split != "validation" && split != "test")
+    throw InputError("builtin bodies", "unknown split \"" + split + "\"",
+                     "use train, validation or test");
+  if (index < 0)
+    throw InputError("builtin bodies", cat("negative body number ", index), "count from 0");
+  const BodyShape shape = draw_body_shape(body_key(seed, split, index));
+  const ImplicitSurface surface = shape_surface(shape);
+  Body body =
+      body_of(shape, surface, one_mesh ? average_mesh_on(shape, surface) : mesh_of(shape, surface));
+  body.id = cat("builtin_", split, "_", index);
+  body.split = split;
+  return body;
+}
+
+Body builtin_average_body() {
+  const BodyShape average;
+  const ImplicitSurface surface = shape_surface(average);
+  return body_of(average, surface, mesh_of(average, surface));
 }
 
 std::vector<Body> builtin_bodies(uint64_t seed, int train, int validation, int test,

@@ -23,6 +23,9 @@ Body builtin_body(uint64_t seed, const std::string& split, int index, bool one_m
 std::vector<Body> builtin_bodies(uint64_t seed, int train, int validation, int test,
                                  bool one_mesh = false);
 
+/// Neither of a sex nor of a split: who stands in where only a skeleton is known.
+Body builtin_average_body();
+
 /// Rest joints of the average built-in body in metres: the skeleton of the built-in motions.
 Joints builtin_rest_joints();
 

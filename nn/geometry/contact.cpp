@@ -32,30 +32,51 @@ std::vector<std::array<bool, 2>> standing_feet(const std::vector<Joints>& perfor
   return out;
 }
 
-void move_foot(const Joints& rest, int side, const Vec3& offset, Pose* pose) {
-  const int hip = 1 + side, knee = 4 + side, ankle = 7 + side;
+namespace {
+
+/// Two bones and what hangs on them: thigh, shin and foot, or upper arm, forearm and hand.
+struct Chain {
+  int from, middle, end;
+  Vec3 bends;  ///< where the middle joint of a straight limb points, in the axes of `from`
+};
+
+/// Moves the end of the chain by `offset` as far as it reaches; the end keeps its orientation, the
+/// middle joint its side.
+void move_end(const Joints& rest, const Chain& chain, const Vec3& offset, Pose* pose) {
+  const auto from = static_cast<size_t>(chain.from), middle = static_cast<size_t>(chain.middle),
+             end = static_cast<size_t>(chain.end);
   const PosedSkeleton posed = forward_kinematics(rest, *pose);
-  const Vec3 h = posed.joints[hip], k = posed.joints[knee], a = posed.joints[ankle];
-  const double thigh = (k - h).norm(), shin = (a - k).norm();
+  const Vec3 h = posed.joints[from], k = posed.joints[middle], a = posed.joints[end];
+  const double upper = (k - h).norm(), lower = (a - k).norm();
   const Vec3 wanted = a + offset - h;
-  if (!(thigh > 1e-6 && shin > 1e-6 && wanted.norm() > 1e-6)) return;
+  if (!(upper > 1e-6 && lower > 1e-6 && wanted.norm() > 1e-6)) return;
   const double reach =
-      std::clamp(wanted.norm(), std::abs(thigh - shin) + 1e-4, kStretched * (thigh + shin));
+      std::clamp(wanted.norm(), std::abs(upper - lower) + 1e-4, kStretched * (upper + lower));
   const Vec3 along = wanted.normalized();
-  // Where the knee points; of a straight leg, forward a little.
-  const Vec3 bent = (k - h) + 1e-3 * thigh * posed.global[hip].col(2);
+  const Vec3 bent = (k - h) + 1e-3 * upper * (posed.global[from] * chain.bends);
   Vec3 across = bent - along.dot(bent) * along;
   if (!(across.norm() > 1e-9)) return;
   across.normalize();
   const double cosine =
-      std::clamp((thigh * thigh + reach * reach - shin * shin) / (2 * thigh * reach), -1.0, 1.0);
-  const Vec3 new_knee = thigh * (cosine * along + std::sqrt(1 - cosine * cosine) * across);
-  const Vec3 new_ankle = reach * along;
-  const Mat3 thigh_turn = shortest_arc(k - h, new_knee) * posed.global[hip],
-             shin_turn = shortest_arc(a - k, new_ankle - new_knee) * posed.global[knee];
-  pose->local[hip] = posed.global[kParents[hip]].transpose() * thigh_turn;
-  pose->local[knee] = thigh_turn.transpose() * shin_turn;
-  pose->local[ankle] = shin_turn.transpose() * posed.global[ankle];
+      std::clamp((upper * upper + reach * reach - lower * lower) / (2 * upper * reach), -1.0, 1.0);
+  const Vec3 new_middle = upper * (cosine * along + std::sqrt(1 - cosine * cosine) * across);
+  const Vec3 new_end = reach * along;
+  const Mat3 upper_turn = shortest_arc(k - h, new_middle) * posed.global[from],
+             lower_turn = shortest_arc(a - k, new_end - new_middle) * posed.global[middle];
+  pose->local[from] = posed.global[static_cast<size_t>(kParents[from])].transpose() * upper_turn;
+  pose->local[middle] = upper_turn.transpose() * lower_turn;
+  pose->local[end] = lower_turn.transpose() * posed.global[end];
+}
+
+}  // namespace
+
+void move_foot(const Joints& rest, int side, const Vec3& offset, Pose* pose) {
+  move_end(rest, {1 + side, 4 + side, 7 + side, Vec3::UnitZ()}, offset, pose);
+}
+
+void move_hand(const Joints& rest, int side, const Vec3& offset, Pose* pose) {
+  move_end(rest, {kLeftShoulder + side, kLeftElbow + side, kLeftWrist + side, -Vec3::UnitZ()},
+           offset, pose);
 }
 
 }  // namespace restage

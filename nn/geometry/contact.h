@@ -1,4 +1,4 @@
-// Feet that stand, and legs that reach.
+// Feet that stand, and limbs that reach.
 #pragma once
 
 #include <vector>
@@ -17,5 +17,7 @@ std::vector<std::array<bool, 2>> standing_feet(const std::vector<Joints>& perfor
 /// Moves the left (side 0) or right foot of a pose by `offset` (metres) as far as the leg reaches:
 /// hip and knee turn, the foot keeps its own orientation, the knee its side of the leg.
 void move_foot(const Joints& rest, int side, const Vec3& offset, Pose* pose);
+/// The same of a hand: shoulder and elbow turn.
+void move_hand(const Joints& rest, int side, const Vec3& offset, Pose* pose);
 
 }  // namespace restage

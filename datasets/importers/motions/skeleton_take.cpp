@@ -163,7 +163,8 @@ SkeletonTake of_gltf(const std::string& path, const MotionOptions& options,
   out.report.file = path;
   const GltfRig rig = find_rig(file, options, out.report);
   // A body stands on its soles, wherever its file lets it rest; bare bones, where they rest.
-  out.rest = file.vertices.empty() ? t_pose_joints(rig) : GltfOwnRig(file, rig).rest();
+  if (!file.vertices.empty()) out.figure = std::make_shared<GltfOwnRig>(file, rig);
+  out.rest = out.figure ? out.figure->rest() : t_pose_joints(rig);
   check_handedness(out.rest, options.force, out.report);
   const GltfClip& clip = name.empty() ? first_clip(file, rig) : find_clip(file, name);
   out.name = clip.name;

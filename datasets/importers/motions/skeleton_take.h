@@ -1,12 +1,14 @@
 // What a skeleton does in its file, to be done by another skeleton exactly: no network, no surface.
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "datasets/importers/motions/motion_clip.h"
 #include "datasets/readers/gltf/gltf.h"
+#include "nn/geometry/own_rig.h"
 
 namespace restage {
 
@@ -15,8 +17,9 @@ struct SkeletonTake {
   Joints rest;       ///< the T-pose that turns are counted from, metres, y up, facing +z
   /// At 30 fps: world turns from the T-pose, and joints, in the world in which `rest` stands.
   std::vector<PosedSkeleton> frames;
-  bool own_floor = false;            ///< the source says where its floor is
-  std::vector<FingerTurns> fingers;  ///< the same of fingers; empty: the source has none
+  bool own_floor = false;                ///< the source says where its floor is
+  std::vector<FingerTurns> fingers;      ///< the same of fingers; empty: the source has none
+  std::shared_ptr<const OwnRig> figure;  ///< whose skeleton it is; null: bare bones
   ImportReport report;
 };
 

@@ -12,6 +12,7 @@
 #include "autograd/base/output_check.h"
 #include "autograd/base/words.h"
 #include "autograd/kernels/kernel.h"
+#include "datasets/builtin/bodies.h"
 #include "datasets/doctor/examine.h"
 #include "datasets/importers/motions/skeleton_take.h"
 #include "datasets/readers/text/text.h"
@@ -332,6 +333,10 @@ void add_system_options(CommandOptions app, RetargetCommand& c) {
                  "on: soles stand on the floor, and no foot goes below it; off (default: on, but "
                  "for X.h5 of a target without bones)")
       .one_of({"on", "off"});
+  app.add_option("--contacts", c.contacts,
+                 "on: hands touch what the source's hands touch, and go through nothing; off "
+                 "(default: as of --floor)")
+      .one_of({"on", "off"});
   app.add_flag("!--no-keep-limbs", c.options.keep_limbs,
                "legs and arms that cross are named as each frame shows them");
   app.add_flag("!--no-steady-bones", c.options.steady_bones,
@@ -407,8 +412,9 @@ SystemInput load_input(const RetargetCommand& c, const Common& common) {
   const SystemType& type = system_type(c.system);
   if (!c.rest.empty() && !type.own_skin)  // it moves vertices without joints
     throw InputError("", "--rest says nothing to --system " + type.name, "leave it out");
-  if (!c.floor.empty() && std::count(type.roles.begin(), type.roles.end(), "skeleton") == 0)
-    throw InputError("", "--floor says nothing to --system " + type.name, "leave it out");
+  for (const auto& [given, option] : {std::pair(&c.floor, "--floor"), {&c.contacts, "--contacts"}})
+    if (!given->empty() && std::count(type.roles.begin(), type.roles.end(), "skeleton") == 0)
+      throw InputError("", cat(option, " says nothing to --system ", type.name), "leave it out");
   if (c.weights.empty() && type.roles.empty()) return input;
   const std::string weights = c.weights.empty() ? standard_weights() : c.weights;
   input.weights_name = weights_path(weights);
@@ -433,14 +439,24 @@ SinkOptions sink_options(const RetargetCommand& c, const SystemInput& input,
   return out;
 }
 
-bool floor_is_on(const RetargetCommand& c, const TargetMesh& target) {
-  if (!c.floor.empty()) return c.floor == "on";
+bool is_on(const std::string& asked, const RetargetCommand& c, const TargetMesh& target) {
+  if (!asked.empty()) return asked == "on";
   return target.own || !(c.to.out.empty() || text::ends_in(c.to.out, {".h5", ".hdf5"}));
+}
+
+PartSurfaces average_surfaces() {
+  Body body = builtin_average_body();
+  const double leg = leg_length(body.joints);
+  for (Vec3& x : body.joints) x /= leg;
+  for (Point& p : body.rest.vertices) p /= static_cast<float>(leg);
+  return {body.rest, body.joints, body.weights};
 }
 
 std::unique_ptr<System> system_for(const RetargetCommand& c, SystemInput input,
                                    TargetMesh& target) {
-  input.options.floor = floor_is_on(c, target);
+  input.options.floor = is_on(c.floor, c, target);
+  if (is_on(c.contacts, c, target))
+    input.options.contacts = std::make_shared<PartSurfaces>(average_surfaces());
   if (!c.rest.empty()) input.rest = rest_joints(c.rest);
   joints_given(c, input);
   if (target.own && !c.rest.empty())
@@ -483,7 +499,8 @@ void add_retarget(Program& program) {
       "--no-foot-lock\n"
       "restage retarget --source s.h5 --target a.ply --out r.h5 --no-steady-bones --no-keep-limbs "
       "--online\n"
-      "restage retarget --source s.h5 --target a.ply --out r.h5 --joints smpl --floor on\n"
+      "restage retarget --source s.h5 --target a.ply --out r.h5 --joints smpl --floor on "
+      "--contacts on\n"
       "restage retarget --source scans.h5 --target hero.ply --system register --rest rest.h5 "
       "--out r.h5",
       run_retarget);

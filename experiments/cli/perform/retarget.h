@@ -20,7 +20,7 @@ struct RetargetCommand {
   std::string system = "chain", rest;
   SinkOptions to;
   RetargetOptions options;
-  std::string floor;  ///< "on" or "off"; empty: floor_is_on() decides
+  std::string floor, contacts;  ///< "on" or "off"; empty: is_on() decides
   bool profile = false, from_surface = false;
 };
 
@@ -62,9 +62,12 @@ void check_mesh(const RetargetCommand& c, const TargetMesh& target);
 SystemInput load_input(const RetargetCommand& c, const Common& common);
 /// The same with the target; what is refused because its rig is not known says so.
 std::unique_ptr<System> system_for(const RetargetCommand& c, SystemInput input, TargetMesh& target);
-/// Whether feet are put on the floor: unless something else is asked for, of every target but a
-/// bare mesh whose result is numbers, which may be measured.
-bool floor_is_on(const RetargetCommand& c, const TargetMesh& target);
+/// Whether feet are put on the floor, and hands where the source's touch: unless something else is
+/// asked for (`asked`), of every target but a bare mesh whose result is numbers, which may be
+/// measured.
+bool is_on(const std::string& asked, const RetargetCommand& c, const TargetMesh& target);
+/// Who stands in for a source whose surface is not known, with legs of 1 m.
+PartSurfaces average_surfaces();
 /// Where frames go, and which joints the target's are: its rig's, those of --rest, else those of
 /// the weights. InputError: they cannot be converted to --joints, or --rest holds others than the
 /// weights.

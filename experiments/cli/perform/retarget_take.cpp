@@ -9,6 +9,7 @@
 #include "experiments/cli/perform/retarget.h"
 #include "experiments/cli/perform/retarget_words.h"
 #include "experiments/text.h"
+#include "infer/contacts.h"
 #include "infer/footing.h"
 #include "infer/frame_rate.h"
 
@@ -93,6 +94,18 @@ TakeOptions options_of(const RetargetCommand& c, const Joints& performer) {
   return out;
 }
 
+/// How far the bones at these joints are from being the source's, scaled; of the leg.
+double unlike(const SkeletonTake& take, const Joints& rest, const std::vector<size_t>& joints) {
+  const double scale = leg_length(rest) / std::max(leg_length(take.rest), 1e-9);
+  double out = 0;
+  for (const size_t j : joints) {
+    const auto from_pelvis = [&](const Joints& x) { return Vec3(x[j] - x[kPelvis]); };
+    out = std::max(out, (from_pelvis(rest) - scale * from_pelvis(take.rest)).norm());
+  }
+  return out / std::max(leg_length(rest), 1e-9);
+}
+constexpr double kSame = 0.01;
+
 /// Keeps the feet of a target above the floor that performs another's motion: before a foot would
 /// go below it, the foot is raised, and later let down. What a knee cannot give, the pelvis does.
 class Floor {
@@ -104,15 +117,7 @@ class Floor {
         soles_(shown.target, rest_, shown.rig->weights) {}
 
   /// Somebody with the source's own legs does exactly what the source does, whatever that is.
-  bool is_needed() const {
-    constexpr double kSame = 0.01;  // of the leg
-    const auto from_pelvis = [](const Joints& x, size_t j) { return Vec3(x[j] - x[kPelvis]); };
-    for (const size_t j : {1, 2, 4, 5, 7, 8, 10, 11})
-      if ((from_pelvis(rest_, j) - scale_ * from_pelvis(take_.rest, j)).norm() >
-          kSame * leg_length(rest_))
-        return true;
-    return false;
-  }
+  bool is_needed() const { return unlike(take_, rest_, {1, 2, 4, 5, 7, 8, 10, 11}) > kSame; }
 
   /// Looks at the whole take.
   void prepare() {
@@ -159,6 +164,36 @@ class Floor {
   std::vector<double> raised_;
 };
 
+/// Hands that touch what the source's touch.
+class Hands {
+ public:
+  Hands(const SkeletonTake& take, const Shown& shown)
+      : take_(take),
+        rest_(shown.rig->rest),
+        contacts_(PartSurfaces(shown.target, rest_, shown.rig->weights)),
+        theirs_(take.figure
+                    ? PartSurfaces(take.figure->mesh(), take.figure->rest(), take.figure->weights())
+                    : average_surfaces()),
+        size_(take.figure ? 1 : leg_length(take.rest)) {}
+
+  /// Somebody with the source's own trunk and arms does exactly what the source does.
+  bool is_needed() const {
+    return unlike(take_, rest_, {3, 6, 9, 12, 13, 14, 15, 16, 17, 18, 19, 20, 21}) > kSame;
+  }
+
+  void operator()(size_t frame, Pose* pose) const {
+    const BodyInPose source{theirs_, take_.frames[frame], size_};
+    move_hands(rest_, contacts_.moves(source, rest_, *pose), pose);
+  }
+
+ private:
+  const SkeletonTake& take_;
+  const Joints& rest_;
+  Contacts contacts_;
+  PartSurfaces theirs_;
+  double size_;
+};
+
 }  // namespace
 
 bool has_take(const RetargetCommand& c, std::string* why) {
@@ -194,15 +229,19 @@ Retargeted run_take(const RetargetCommand& c, const Common& common, const Retarg
   say_take(take);
   say_target(target);
   std::optional<Floor> floor;
-  if (floor_is_on(c, target) && shown.rig != nullptr) floor.emplace(take, shown);
+  if (is_on(c.floor, c, target) && shown.rig != nullptr) floor.emplace(take, shown);
   if (floor && c.floor.empty() && !floor->is_needed()) floor.reset();
   if (floor) floor->prepare();
+  std::optional<Hands> hands;
+  if (is_on(c.contacts, c, target) && shown.rig != nullptr) hands.emplace(take, shown);
+  if (hands && c.contacts.empty() && !hands->is_needed()) hands.reset();
   int64_t frames = 0;
   for (size_t f = 0; f < take.frames.size(); f += static_cast<size_t>(c.to.every)) {
     caller.look();
     RetargetedFrame frame;
     frame.pose = perform_take(take, f, rest);
     if (floor) (*floor)(f, &frame.pose);
+    if (hands) (*hands)(f, &frame.pose);
     frame.joints.emplace();
     if (!take.fingers.empty()) frame.fingers = take.fingers[f];
     if (target.own) {

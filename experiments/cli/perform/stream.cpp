@@ -345,7 +345,8 @@ int run_stream(const StreamCommand& c, const Common& common) {
   check_mesh(c.how, target);
   SystemInput made_from = load_input(c.how, common);
   RetargetCommand how = c.how;
-  if (how.floor.empty()) how.floor = "on";  // nobody measures what is shown
+  for (std::string* asked : {&how.floor, &how.contacts})
+    if (asked->empty()) *asked = "on";  // nobody measures what is shown
   const auto system = system_for(how, std::move(made_from), target);
   if (system->rig() == nullptr)
     throw InputError(c.how.target, "is moved without bones by --system " + c.how.system,
@@ -393,6 +394,7 @@ void add_stream(Program& program) {
       "restage stream --target hero.ply --source tcp://0.0.0.0:9000 --vmc 192.168.0.7:39539 --ws "
       "0.0.0.0:8080 --samples 1 --min-confidence 0.5\n"
       "restage stream --target hero.glb --source captured/ --vmc 39539 --anchor 0 --floor off "
+      "--contacts off "
       "--no-foot-lock "
       "--no-steady-bones --no-keep-limbs --force --device cuda\n"
       "restage stream --target hero.ply --system register --rest rest.h5 --source captured/ --vmc "

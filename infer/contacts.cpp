@@ -1,0 +1,184 @@
+#include "infer/contacts.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "nn/geometry/contact.h"
+
+namespace restage {
+namespace {
+
+// In lengths of the arm, shoulder to wrist.
+constexpr double kTouching = 0.02, kAway = 0.15;     // from the surface of the hand
+constexpr double kHandsNear = 0.5, kHandsFar = 0.7;  // from wrist to wrist
+constexpr double kThick = 0.04;                      // thick hands are so much farther apart
+constexpr std::array<double, 3> kOnHand = {0.05, 0.5, 0.9};  // places along a hand
+constexpr int kRounds = 4;
+
+/// What the left hand can touch, but for the right hand; and the right hand, but for the left one.
+constexpr std::array<std::array<BodyPart, 11>, 2> kTouchable = {
+    {{BodyPart::belly, BodyPart::chest, BodyPart::head, BodyPart::left_thigh, BodyPart::right_thigh,
+      BodyPart::left_shin, BodyPart::right_shin, BodyPart::left_foot, BodyPart::right_foot,
+      BodyPart::right_upper_arm, BodyPart::right_forearm},
+     {BodyPart::belly, BodyPart::chest, BodyPart::head, BodyPart::left_thigh, BodyPart::right_thigh,
+      BodyPart::left_shin, BodyPart::right_shin, BodyPart::left_foot, BodyPart::right_foot,
+      BodyPart::left_upper_arm, BodyPart::left_forearm}}};
+
+double arm_length(const Joints& joints) {
+  const auto bone = [&](int a, int b) {
+    return (joints[static_cast<size_t>(a)] - joints[static_cast<size_t>(b)]).norm();
+  };
+  return 0.5 * (bone(kLeftShoulder, kLeftElbow) + bone(kLeftElbow, kLeftWrist) +
+                bone(kRightShoulder, kRightElbow) + bone(kRightElbow, kRightWrist));
+}
+
+/// 1 below `near`, 0 above `far`, smooth between.
+double falling(double x, double near, double far) {
+  const double t = std::clamp((far - x) / (far - near), 0.0, 1.0);
+  return t * t * (3 - 2 * t);
+}
+
+/// A place of a hand over a part.
+struct Over {
+  PlaceOnPart place;
+  double gap;  ///< between the two surfaces, metres
+  Vec3 out;
+};
+
+Over over(const BodyInPose& figure, int side, double share, BodyPart part, const Vec3& moved) {
+  const Vec3 at = figure.surfaces.on_hand(side, figure.posed, share, figure.size) + moved;
+  const NearPart near = figure.surfaces.locate(part, figure.posed, at, figure.size);
+  return {
+      near.place,
+      near.over - figure.surfaces.hand_radius(side, figure.posed, share, -near.out, figure.size),
+      near.out};
+}
+
+/// How the source's hand lies over one part, and what that asks of the target's.
+struct Asked {
+  BodyPart part;
+  double share;
+  Over source;
+  double weight;
+};
+
+class Solve {
+ public:
+  Solve(const BodyInPose& source, const BodyInPose& target, const std::array<double, 2>& sure)
+      : source_(source),
+        target_(target),
+        arm_(arm_length(source.posed.joints)),
+        scale_(arm_length(target.posed.joints) / std::max(arm_, 1e-6)) {
+    for (size_t side = 0; side < 2; ++side) {
+      auto asked = asked_[side].begin();
+      for (const BodyPart part : kTouchable[side])
+        for (const double share : kOnHand) {
+          const Over at = over(source_, static_cast<int>(side), share, part, Vec3::Zero());
+          *asked++ = {part, share, at, sure[side] * falling(at.gap / arm_, kTouching, kAway)};
+        }
+    }
+    hands_ =
+        std::min(sure[0], sure[1]) * falling(apart(source_).norm() / arm_, kHandsNear, kHandsFar);
+  }
+
+  /// By how much each wrist has to move, metres.
+  std::array<Vec3, 2> operator()() {
+    for (const int side : {0, 1}) touch(side);
+    for (int round = 0; round < kRounds; ++round) {
+      keep_hands();
+      for (const int side : {0, 1}) leave_parts(side);
+    }
+    return moved_;
+  }
+
+ private:
+  static Vec3 apart(const BodyInPose& figure) {
+    return figure.posed.joints[kRightWrist] - figure.posed.joints[kLeftWrist];
+  }
+
+  /// What touches touches: the nearest parts decide.
+  void touch(int side) {
+    Vec3 sum = Vec3::Zero();
+    double weights = 0, most = 0;
+    for (const Asked& asked : asked_[static_cast<size_t>(side)]) {
+      if (asked.weight <= 0) continue;
+      const Vec3 now = target_.surfaces.on_hand(side, target_.posed, asked.share, target_.size);
+      const double weight = std::pow(asked.weight, 4);
+      sum += weight * (wanted(side, asked) - now);
+      weights += weight;
+      most = std::max(most, asked.weight);
+    }
+    if (weights > 1e-12) moved_[static_cast<size_t>(side)] = most / weights * sum;
+  }
+
+  Vec3 wanted(int side, const Asked& asked) const {
+    const Vec3 on =
+        target_.surfaces.point(asked.part, target_.posed, asked.source.place, 0, target_.size);
+    const Vec3 further =
+        target_.surfaces.point(asked.part, target_.posed, asked.source.place, 1, target_.size);
+    const Vec3 out = further - on;
+    const double radius =
+        target_.surfaces.hand_radius(side, target_.posed, asked.share, -out, target_.size);
+    return on + (radius + scale_ * asked.source.gap) * out;
+  }
+
+  /// Each wrist goes half of the way.
+  void keep_hands() {
+    if (hands_ <= 0) return;
+    const Vec3 off = scale_ * apart(source_) + thicker() - (apart(target_) + moved_[1] - moved_[0]);
+    moved_[0] -= 0.5 * hands_ * off;
+    moved_[1] += 0.5 * hands_ * off;
+  }
+
+  /// How much farther apart the hands have to be not to go through each other deeper than the
+  /// source's, from the left one to the right one.
+  Vec3 thicker() const {
+    const Vec3 by = scale_ * apart(source_) - apart(target_);
+    Vec3 out = Vec3::Zero();
+    for (const double share : kOnHand)
+      for (const int side : {0, 1}) {
+        const BodyPart other = side == 0 ? BodyPart::right_hand : BodyPart::left_hand;
+        const double sign = side == 0 ? -1 : 1;  // the left hand moves, or the right one
+        const Over theirs = over(source_, side, share, other, Vec3::Zero());
+        const Over ours = over(target_, side, share, other, sign * (by + out));
+        const double depth = std::min(scale_ * theirs.gap, 0.0) - ours.gap;
+        if (depth > 0) out += sign * depth * ours.out;
+      }
+    const double most = kThick * scale_ * arm_;
+    return out * std::min(1.0, most / std::max(out.norm(), 1e-9));
+  }
+
+  /// What goes through a part deeper than the source's hand is moved out of it.
+  void leave_parts(int side) {
+    Vec3& moved = moved_[static_cast<size_t>(side)];
+    for (const Asked& asked : asked_[static_cast<size_t>(side)]) {
+      const Over now = over(target_, side, asked.share, asked.part, moved);
+      const double depth = std::min(scale_ * asked.source.gap, 0.0) - now.gap;
+      if (depth > 0) moved += depth * now.out;
+    }
+  }
+
+  const BodyInPose& source_;
+  const BodyInPose& target_;
+  double arm_, scale_, hands_;
+  std::array<std::array<Asked, kTouchable[0].size() * kOnHand.size()>, 2> asked_;
+  std::array<Vec3, 2> moved_ = {Vec3::Zero(), Vec3::Zero()};
+};
+
+}  // namespace
+
+std::array<Vec3, 2> Contacts::moves(const BodyInPose& source, const Joints& rest, const Pose& pose,
+                                    const std::array<double, 2>& sure) const {
+  const PosedSkeleton posed = forward_kinematics(rest, pose);
+  const BodyInPose target{target_, posed};
+  return Solve(source, target, sure)();
+}
+
+void move_hands(const Joints& rest, const std::array<Vec3, 2>& by, Pose* pose) {
+  constexpr double kNothing = 1e-5;  // metres
+  for (const int side : {0, 1})
+    if (const Vec3& offset = by[static_cast<size_t>(side)]; offset.norm() > kNothing)
+      move_hand(rest, side, offset, pose);
+}
+
+}  // namespace restage
