@@ -74,7 +74,7 @@ class Outputs(Retarget):
     def test_folders_keep_vertices_order_and_faces(self):
         self.done(*self.call("frames/"))
         self.done(*self.call("objs/", "--format", "obj"))
-        self.done(*self.call("out.h5"))
+        self.done(*self.call("out.h5", "--contacts", "on"))
         names = sorted(os.listdir(self.path("frames")))
         self.assertEqual(len(names), FRAMES)
         first = self.bytes("frames/" + names[0])

@@ -187,7 +187,7 @@ class StreamTest(CliTest):
         """The joints that were put together are those of `retarget`, to a tenth of a millimetre."""
         for k, points in enumerate(self.clouds):
             self.ply("scans/f%02d.ply" % k, points)
-        self.done("retarget", "--source", "scans", "--target", target, "--weights", LITE, "--out", "truth.h5")
+        self.done("retarget", "--source", "scans", "--target", target, "--weights", LITE, "--contacts", "on", "--out", "truth.h5")
         values = [x for bundle in bundles for joint in joints_of(bundle) for x in joint]
         self.h5("mine.h5", joints=([len(bundles), 22, 3], values))
         self.assertLess(self.json("eval", "--pred", "mine.h5", "--truth", "truth.h5")["mean"]["mpjpe"], 1e-4)

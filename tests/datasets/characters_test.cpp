@@ -197,6 +197,66 @@ TEST_F(Characters, WhatMovesVerticesIsNeverLeftBehind) {
   }
 }
 
+/// A character of whose left forearm a bone of its own carries the second half.
+GlbParts with_forearm_bone(const testing::KnownCharacter& known, const char* name, double along) {
+  GlbParts parts = CharacterMaker(known, testing::plain_style()).parts;
+  GltfJson& nodes = parts.root["nodes"];
+  const Vec3 place = along * (known.body.joints[kLeftWrist] - known.body.joints[kLeftElbow]);
+  const size_t added = nodes.size();
+  nodes.push_back({{"name", name}, {"translation", {place.x(), place.y(), place.z()}}});
+  nodes[kLeftElbow]["children"].push_back(added);
+  return parts;
+}
+
+/// The hand turned about the forearm's line, everything else at rest.
+Pose wrung(const Joints& rest, double degrees) {
+  Pose out;
+  out.local.fill(Mat3::Identity());
+  out.root = rest[kPelvis];
+  const Vec3 line = (rest[kLeftWrist] - rest[kLeftElbow]).normalized();
+  out.local[kLeftWrist] = Eigen::AngleAxisd(degrees * M_PI / 180, line).toRotationMatrix();
+  return out;
+}
+
+/// The angle of a node's rotation in a pose from the one at rest, degrees.
+double turned(const GltfOwnRig& own, int number, const Pose& pose) {
+  const auto rotation = [&](const Pose& p) {
+    for (const auto& [node, turn] : own.turns(p, nullptr).local)
+      if (node == number) return turn;
+    ADD_FAILURE() << "node " << number << " is not turned";
+    return Quat::Identity();
+  };
+  return rotation(pose).angularDistance(rotation(wrung(own.rest(), 0))) * 180 / M_PI;
+}
+
+TEST_F(Characters, TwistBonesTakeTheirShare) {
+  const Joints& rest = known_.body.joints;
+  const int added = 22 + 2;  // after the joints, the armature and the mesh
+  for (const auto& [name, along, share] :
+       {std::tuple{"lowerarm_twist_01_l", 0.6, 0.6}, {"Forearm Roll L", 0.0, 0.5}}) {
+    const TargetMesh target = read_target(write("in.glb", with_forearm_bone(known_, name, along)));
+    ASSERT_TRUE(target.own);
+    EXPECT_NEAR(turned(*target.own, added, wrung(rest, 100)), share * 100, 0.5) << name;
+    EXPECT_NEAR(turned(*target.own, kLeftElbow, wrung(rest, 100)), 0, 1e-3) << name;
+  }
+}
+
+TEST_F(Characters, AWrungWristIsEasedByTheForearm) {
+  for (const char* name : {"Sleeve", ""}) {  // a bone of another kind stays
+    GlbParts parts = *name ? with_forearm_bone(known_, name, 0.5)
+                           : CharacterMaker(known_, testing::plain_style()).parts;
+    const TargetMesh target = read_target(write("in.glb", parts));
+    ASSERT_TRUE(target.own);
+    const Joints& rest = target.own->rest();
+    EXPECT_NEAR(turned(*target.own, kLeftElbow, wrung(rest, 70)), 0, 1e-3);
+    EXPECT_NEAR(turned(*target.own, kLeftElbow, wrung(rest, 135)), 40, 0.5);
+    EXPECT_NEAR(turned(*target.own, kLeftElbow, wrung(rest, 180)), 0, 0.5) << "no sign";
+    Joints joints;
+    target.own->place(wrung(rest, 135), nullptr, &joints, nullptr);
+    EXPECT_LT((joints[kLeftWrist] - rest[kLeftWrist]).norm(), 1e-4);
+  }
+}
+
 TEST_F(Characters, RigidPartsAreDrivenByTheirNodes) {
   RigStyle style = testing::mixamo_style();
   style.rigid = true;

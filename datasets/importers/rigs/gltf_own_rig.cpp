@@ -51,11 +51,15 @@ GltfOwnRig::GltfOwnRig(Gltf file, GltfRig rig) : file_(std::move(file)), rig_(st
   for (size_t j = 0; j < kJoints; ++j) rest_[j] = joint_at(t_pose, j);
   const Vec3 moved = put_on_floor(mesh_, rest_[kPelvis]);
   for (Vec3& x : rest_) x -= moved;
+  twists_ = find_twist_bones(file_, rig_, rest_, joint_of_);
 }
 
 /// How a node is turned from the T-pose, in our axes; nothing: it keeps its rest.
 std::optional<Mat3> GltfOwnRig::turn_of(size_t node, const Rotations& global,
                                         const FingerTurns* fingers) const {
+  for (const TwistBone& bone : twists_)
+    if (bone.node == static_cast<int>(node))
+      return global[bone.joint] * twist_of(bone, rest_, global);
   if (const int j = joint_of_[node]; j >= 0) return global[static_cast<size_t>(j)];
   if (const int k = finger_of_[node]; k >= 0 && fingers != nullptr)
     return (*fingers)[static_cast<size_t>(k)];
@@ -67,6 +71,8 @@ GltfTransforms GltfOwnRig::world(const Pose* pose, const FingerTurns* fingers,
   Rotations global;
   global.fill(Mat3::Identity());
   if (pose != nullptr) global = to_global(pose->local);
+  for (const int side : {0, 1})
+    if (pose != nullptr && !shares_twist(side)) share_twist(side, rest_, &global);
   GltfTransforms out(file_.nodes.size());
   for (const int at : rig_.order) {
     const auto n = static_cast<size_t>(at);
@@ -90,6 +96,12 @@ GltfTransforms GltfOwnRig::world(const Pose* pose, const FingerTurns* fingers,
     out[n] = parent * moved.local();
   }
   return out;
+}
+
+bool GltfOwnRig::shares_twist(int side) const {
+  return std::any_of(twists_.begin(), twists_.end(), [&](const TwistBone& bone) {
+    return bone.joint == static_cast<size_t>(kLeftElbow + side);
+  });
 }
 
 /// Where the node that is moved has to be for the pelvis to lie where the pose says.

@@ -7,6 +7,7 @@
 
 #include "datasets/importers/rigs/finger_bones.h"
 #include "datasets/importers/rigs/gltf_rig.h"
+#include "datasets/importers/rigs/twist_bones.h"
 #include "nn/geometry/own_rig.h"
 
 namespace restage {
@@ -29,7 +30,8 @@ struct NodeTurns {
 /// The formula: a node of joint j has the world rotation D_j T, where D_j is the joint's turn from
 /// the T-pose and T the node's world rotation in the T-pose; so of fingers. Only the hips are
 /// moved, and bones that hang elsewhere in the file than on the body: they stay where they are on
-/// the bone that they belong to. All other nodes keep their local transform of the file.
+/// the bone that they belong to. Turns about the line of an arm are shared out (TwistBone). All
+/// other nodes keep their local transform of the file.
 class GltfOwnRig final : public OwnRig {
  public:
   /// `rig`: find_rig() of `file`.
@@ -54,6 +56,7 @@ class GltfOwnRig final : public OwnRig {
   std::optional<Mat3> turn_of(size_t node, const Rotations& global,
                               const FingerTurns* fingers) const;
   Vec3 joint_at(const GltfTransforms& world, size_t j) const;
+  bool shares_twist(int side) const;  ///< whether the forearm has bones for it
   Vec3 hips_place(const Pose& pose) const;
   Vec3 carried(const GltfTransforms& world, size_t node) const;
   void check_joined(const Joints& joints) const;
@@ -62,6 +65,7 @@ class GltfOwnRig final : public OwnRig {
   GltfRig rig_;
   std::vector<int> joint_of_;   ///< per node: the joint that turns it, or -1
   std::vector<int> finger_of_;  ///< the same of fingers
+  std::vector<TwistBone> twists_;
   Mesh mesh_;
   Joints rest_;
 };
