@@ -96,7 +96,7 @@ RngKey body_key(uint64_t seed, const std::string& split, int index) {
   return RngKey{seed, 0}.fold("builtin.body").fold(split).fold(static_cast<uint64_t>(index));
 }
 
-Body body_of(const BodyShape& shape, const ImplicitSurface& surface, SurfaceMesh mesh) {
+Body body_of(const BodyShape& shape, SurfaceMesh mesh) {
   Body body;
   body.weights = shape_weights(shape, mesh);
   double lo = 1e9, hi = -1e9;
@@ -124,8 +124,7 @@ Body builtin_body(uint64_t seed, const std::string& split, int index, bool one_m
     throw InputError("builtin bodies", cat("negative body number ", index), "count from 0");
   const BodyShape shape = draw_body_shape(body_key(seed, split, index));
   const ImplicitSurface surface = shape_surface(shape);
-  Body body =
-      body_of(shape, surface, one_mesh ? average_mesh_on(shape, surface) : mesh_of(shape, surface));
+  Body body = body_of(shape, one_mesh ? average_mesh_on(shape, surface) : mesh_of(shape, surface));
   body.id = cat("builtin_", split, "_", index);
   body.split = split;
   return body;
@@ -133,8 +132,7 @@ Body builtin_body(uint64_t seed, const std::string& split, int index, bool one_m
 
 Body builtin_average_body() {
   const BodyShape average;
-  const ImplicitSurface surface = shape_surface(average);
-  return body_of(average, surface, mesh_of(average, surface));
+  return body_of(average, mesh_of(average, shape_surface(average)));
 }
 
 std::vector<Body> builtin_bodies(uint64_t seed, int train, int validation, int test,

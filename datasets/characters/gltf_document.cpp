@@ -193,8 +193,8 @@ struct GltfDocument::Worn {
 /// Puts parts of another document into this one.
 class GltfDocument::Tailor {
  public:
-  Tailor(State& state, const Worn& worn, const Gltf& file)
-      : s_(state), worn_(worn), file_(file), rest_(gltf_rest(file)) {
+  Tailor(State& state, const Worn& worn, const Gltf& file, const JointMoves* unposed)
+      : s_(state), worn_(worn), file_(file), rest_(gltf_rest(file)), unposed_(unposed) {
     if (s_.has_binary) pad(s_.binary);
     buffer_ = s_.has_binary ? 0 : s_.list("buffers").size();
     first_node_ = s_.list("nodes").size();
@@ -266,7 +266,10 @@ class GltfDocument::Tailor {
     for (size_t at = 0; at < bytes.size(); at += 64) {
       Eigen::Matrix4f m;
       std::memcpy(m.data(), &bytes[at], 64);
-      m = (m.cast<double>() * rest_[place].matrix()).cast<float>();
+      Eigen::Matrix4d all = m.cast<double>();
+      if (const size_t j = at / 64; unposed_ != nullptr && j < kJoints)
+        all *= (*unposed_)[j].matrix();
+      m = (all * rest_[place].matrix()).cast<float>();
       m.row(3) << 0, 0, 0, 1;
       std::memcpy(&bytes[at], m.data(), 64);
     }
@@ -343,12 +346,14 @@ class GltfDocument::Tailor {
   const Worn& worn_;
   const Gltf& file_;
   const GltfTransforms rest_;
+  const JointMoves* unposed_;
   size_t buffer_ = 0, first_node_ = 0;
   std::optional<size_t> plain_skin_;
 };
 
-void GltfDocument::wear(const std::string& glb, const Gltf& file) {
-  checked_kinds(state_->path, [&] { Tailor(*state_, Worn(glb, state_->path), file).sew(); });
+void GltfDocument::wear(const std::string& glb, const Gltf& file, const JointMoves* unposed) {
+  checked_kinds(state_->path,
+                [&] { Tailor(*state_, Worn(glb, state_->path), file, unposed).sew(); });
 }
 
 void GltfDocument::keep_nodes_only() {

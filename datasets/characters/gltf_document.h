@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "datasets/readers/gltf/gltf.h"
+#include "nn/geometry/skeleton.h"
 
 namespace restage {
 
@@ -39,7 +40,8 @@ class GltfDocument {
   /// which GlbWriter has made for gltf_mesh(file, gltf_rest(file)); `file`: parse_gltf() of this
   /// document. Everything else stays as it is: pictures, materials, texture coordinates, the order
   /// of vertices. A mesh whose node is moved goes to a node of its own, since a skin ignores that.
-  void wear(const std::string& glb, const Gltf& file);
+  /// `unposed`: what took the meshes to the T-pose for which `glb` was made; null: they stand so.
+  void wear(const std::string& glb, const Gltf& file, const JointMoves* unposed = nullptr);
   /// Drops everything but nodes and scenes; nodes show nothing any more.
   void keep_nodes_only();
 

@@ -131,8 +131,11 @@ void check_target(const Mesh& target, const std::string& where, ExamineOptions o
   if (options.joints) check_sides(*options.joints, where);
   options.target = true;
   const Diagnosis d = judge_surface(target, shape_of(target), repeats(target.vertices), options);
+  const Finding* pose = d.find("pose");
+  const bool posed = options.any_pose && pose != nullptr && pose->weight == Weight::wrong;
   for (const Finding& f : d.findings) {
     if (f.weight != Weight::wrong) continue;
+    if (posed && (f.topic == "pose" || f.topic == "facing")) continue;
     const bool nobody = f.topic == "up" && f.sure < kNobody;
     if (f.topic == "points") throw InputError(where, f.what, f.fix);  // force makes no points
     Finding said = f;

@@ -27,7 +27,8 @@ struct ExamineOptions {
   // What the file says, which beats what its shape looks like.
   /// Of a rig, in our frame: unit, up, facing and pose are those of its joints.
   std::optional<Joints> joints;
-  bool y_up = false;  ///< it is a rigged figure of a format whose y axis is up
+  bool any_pose = false;  ///< a target is put into T-pose later
+  bool y_up = false;      ///< it is a rigged figure of a format whose y axis is up
 };
 
 struct Diagnosis {

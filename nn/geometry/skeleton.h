@@ -37,6 +37,8 @@ using Mat3 = Eigen::Matrix3d;
 using Quat = Eigen::Quaterniond;
 using Joints = std::array<Vec3, kJoints>;     ///< positions
 using Rotations = std::array<Mat3, kJoints>;  ///< local or global, said where used
+/// Of each joint, what takes points from one pose to another.
+using JointMoves = std::array<Eigen::Isometry3d, kJoints>;
 
 /// The nine numbers at `x` as they lie in tensors, row by row.
 template <class T>

@@ -2,6 +2,7 @@
 tests/datasets/characters_test.cpp; here are the command, its refusals, and, where they are at hand, real characters and a
 checker that nobody of this repository wrote."""
 import json
+import math
 import os
 import struct
 import subprocess
@@ -294,6 +295,48 @@ class Characters(CliTest):
             at = view.get("byteOffset", 0) + accessor.get("byteOffset", 0)
             out += struct.unpack_from("<%df" % (accessor["count"] * {"VEC3": 3, "VEC4": 4}[accessor["type"]]), binary, at)
         return out
+
+
+class AnyPose(CliTest):
+    """Targets without a rig that do not stand in T-pose; the standard weights put them into it."""
+    def posed(self, name, degrees):
+        """The built-in body with its arms that much below the horizontal; its height."""
+        hero = self.person(frames=2)
+        _, _, body = self.bytes("walk/target.ply").partition(b"end_header\n")
+        faces = [f[1:] for f in struct.iter_unpack("<B3i", body[12 * len(hero):])]
+        shoulder, height = 0.19, 0.81 * max(y for _, y, _ in hero)
+        c, s = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
+
+        def moved(x, y, z):
+            if abs(x) < shoulder or y < 0.7 * height:
+                return x, y, z
+            out, up = abs(x) - shoulder, y - height
+            return math.copysign(shoulder + c * out + s * up, x), height + c * up - s * out, z
+        self.ply(name, [moved(*p) for p in hero], faces)
+        return hero
+
+    def test_a_pose_is_taken_without_a_word(self):
+        hero = self.posed("a.ply", 50)
+        self.assertEqual(self.restage("doctor", "a.ply", "--target").code, 1)  # it is no T-pose
+        call = ["retarget", "--source", "data.h5", "--sequence", "0", "--target", "a.ply", "--weights", STANDARD, "--out"]
+        said = self.restage(*call, "out.glb")
+        self.assertEqual(said.code, 0, said.err)
+        self.assertIn("a.ply: was put into T-pose (a limb was ", said.err)
+        content = self.bytes("out.glb")
+        length, = struct.unpack("<I", content[12:16])
+        document = json.loads(content[20:20 + length])
+        accessor = document["accessors"][document["meshes"][0]["primitives"][0]["attributes"]["POSITION"]]
+        at = 28 + length + document["bufferViews"][accessor["bufferView"]].get("byteOffset", 0)
+        found = list(struct.iter_unpack("<3f", content[at:at + 12 * len(hero)]))
+        off = sorted(math.dist(a, b) for a, b in zip(found, hero))
+        self.assertLess(sum(off) / len(off), 0.03)
+        self.assertLess(off[len(off) * 9 // 10], 0.06)
+
+    def test_what_cannot_be_made_out_is_named(self):
+        hero = self.person(frames=2)
+        knot = [(x * (0.3 + 0.5 * math.cos(9 * y)), y, z + 0.4 * abs(x) * math.sin(7 * y)) for x, y, z in hero]
+        self.ply("knot.ply", knot)
+        self.bad_input(["retarget", "--source", "data.h5", "--sequence", "0", "--target", "knot.ply", "--weights", STANDARD, "--out", "x.glb"], "knot.ply")
 
 
 if __name__ == "__main__":

@@ -332,6 +332,42 @@ TEST_F(Characters, BareMeshesKeepWhatTheyHaveAndGetBones) {
   EXPECT_FALSE(after["nodes"][2].contains("mesh")) << "a skin ignores where its node is";
 }
 
+/// The mesh stands in another pose than the bones rest in; its vertices stay where they are.
+TEST_F(Characters, ABareMeshMayStandInAnyPose) {
+  const GlbParts parts = bare(known_);
+  const std::string in = write("in.glb", parts), content = parts.glb();
+  const Gltf file = parse_gltf(content, in);
+  const Mesh mesh = gltf_mesh(file, gltf_rest(file));
+  SkinWeights weights(2 * known_.body.weights.rows(), kJoints);
+  weights << known_.body.weights, known_.body.weights;
+  JointMoves unposed;
+  for (size_t j = 0; j < kJoints; ++j)
+    unposed[j] = Eigen::Translation3d(0.01 * static_cast<double>(j), 0.02, -0.03) *
+                 Eigen::AngleAxisd(0.05 * static_cast<double>(j), Vec3::UnitZ());
+  GlbWriter ours("ours.glb", mesh, known_.body.joints, weights);
+  for (size_t f = 0; f < kFrames; ++f) ours.push(pose(f));
+  GltfDocument document(content, in);
+  document.wear(ours.bytes(), file, &unposed);
+  document.write(dir / "out.glb");
+  const Gltf out = read_gltf(dir / "out.glb");
+  const GltfClip& clip = find_clip(out, "motion");
+  for (size_t f = 0; f < kFrames; ++f) {
+    const Mesh shown = gltf_mesh(out, gltf_pose(out, clip, static_cast<double>(f) / kFps));
+    const PosedSkeleton posed = forward_kinematics(known_.body.joints, pose(f));
+    for (size_t v = 0; v < mesh.vertices.size(); ++v) {
+      Vec3 wanted = Vec3::Zero();
+      for (size_t j = 0; j < kJoints; ++j)
+        wanted += double{weights(static_cast<Eigen::Index>(v), static_cast<Eigen::Index>(j))} *
+                  (posed.global[j] *
+                       (unposed[j] * mesh.vertices[v].cast<double>() - known_.body.joints[j]) +
+                   posed.joints[j]);
+      ASSERT_LT((shown.vertices[v].cast<double>() - wanted).norm(), 1e-4) << f << " " << v;
+    }
+  }
+  EXPECT_EQ(parts_of(bytes_of(dir / "out.glb")).second.substr(0, parts.binary.size()),
+            parts.binary);
+}
+
 TEST_F(Characters, WhatWouldBeTornIsRefused) {
   RigStyle style = testing::mixamo_style();
   style.hung = {

@@ -12,7 +12,6 @@
 #include "autograd/base/output_check.h"
 #include "autograd/base/words.h"
 #include "autograd/kernels/kernel.h"
-#include "datasets/builtin/bodies.h"
 #include "datasets/doctor/examine.h"
 #include "datasets/importers/motions/skeleton_take.h"
 #include "datasets/readers/text/text.h"
@@ -45,27 +44,6 @@ void check(const RetargetCommand& c, const RetargetCaller& caller) {
   for (const std::string& more : {c.rest, c.bones, c.source_bones, c.body_model, c.asf})
     if (!more.empty()) inputs.push_back(more);
   check_output(c.to.out, inputs);
-}
-
-/// A target that is refused as it stands may only lack the names of its bones: then that is what
-/// there is to mend.
-template <class Work>
-auto with_target(const RetargetCommand& c, const TargetMesh& target, const Work& work) {
-  try {
-    return work();
-  } catch (const InputError& error) {
-    if (!std::string(error.what()).starts_with(c.target)) throw;
-    if (!target.parts.empty())
-      throw InputError(
-          c.target,
-          cat("has no skin, and its ", target.parts, " are no body's: ", target.unknown_parts),
-          "bind them to a skeleton in the program that made them, or name their nodes with "
-          "--bones");
-    if (target.unknown_rig.empty()) throw;
-    throw InputError(
-        c.target, "it would be posed by its rig, which was not recognised: " + target.unknown_rig,
-        "say which bone is which joint with --bones names.yaml (docs/formats.md)");
-  }
 }
 
 /// The doctor's words on what would make the result nonsense.
@@ -108,14 +86,14 @@ struct Outcome {
 class Run {
  public:
   Run(const RetargetCommand& c, SinkOptions to, Source& source, System& system,
-      std::shared_ptr<const GltfOwnRig> own, Gaps& gaps, Profile& profile,
-      const RetargetCaller& caller, bool from_memory)
+      const TargetMesh& target, Gaps& gaps, Profile& profile, const RetargetCaller& caller,
+      bool from_memory)
       : c_(c),
         to_(std::move(to)),
         caller_(caller),
         source_(source),
         system_(system),
-        own_(std::move(own)),
+        target_(target),
         gaps_(gaps),
         profile_(profile),
         from_memory_(from_memory),
@@ -183,11 +161,12 @@ class Run {
   }
 
   Sink new_sink() const {
-    const Shown shown{system_.target(), system_.rig()};
+    const Shown shown{system_.target(), system_.rig(),
+                      target_.unposed ? &*target_.unposed : nullptr};
     if (caller_.sink) return in_joints(to_, caller_.sink(shown));
     std::optional<SourceRecord> source;
     if (!from_memory_) source = source_.record();  // there is no file to be found again
-    return make_sink(to_, shown, source, clip_name(source_.record()), c_.target, own_);
+    return make_sink(to_, shown, source, clip_name(source_.record()), c_.target, target_.own);
   }
 
   const RetargetCommand& c_;
@@ -195,7 +174,7 @@ class Run {
   const RetargetCaller& caller_;
   Source& source_;
   System& system_;
-  const std::shared_ptr<const GltfOwnRig> own_;
+  const TargetMesh& target_;
   Gaps& gaps_;
   Profile& profile_;
   const bool from_memory_;
@@ -290,7 +269,7 @@ Retargeted retarget(const RetargetCommand& c, const Common& common, RetargetCall
   const auto system = system_for(c, std::move(input), target);
   Gaps gaps(source.frames(), source.fps() / static_cast<double>(c.to.every), c.options.force);
   Profile profile({"read", "extract", "motion", "deformation", "write", "frame"});
-  Run run(c, to, source, *system, target.own, gaps, profile, caller, from_memory);
+  Run run(c, to, source, *system, target, gaps, profile, caller, from_memory);
   // Scripts get one line if the source turns out to be bad later on; people need not wait.
   const bool on_terminal = isatty(STDERR_FILENO) != 0;
   if (on_terminal) say_target(target);
@@ -361,110 +340,6 @@ void add_weights_options(CommandOptions app, RetargetCommand& c) {
   app.add_option("--system", c.system, help_of_systems());
   app.add_option("--rest", c.rest,
                  "the target's 22 rest joints (HDF5, /joints [1, 22, 3]) (default: found)");
-}
-
-namespace {
-
-/// Options that only an extractor's system reads would be lost without a word.
-void check_effect(const RetargetOptions& o, const SystemType& type) {
-  if (std::count(type.roles.begin(), type.roles.end(), "skeleton") > 0) return;
-  const RetargetOptions plain;
-  for (const auto& [given, name] : {std::pair{o.samples != plain.samples, "--samples"},
-                                    {o.anchor != plain.anchor, "--anchor"},
-                                    {o.min_confidence != plain.min_confidence, "--min-confidence"},
-                                    {o.foot_lock != plain.foot_lock, "--no-foot-lock"},
-                                    {o.keep_limbs != plain.keep_limbs, "--no-keep-limbs"},
-                                    {o.steady_bones != plain.steady_bones, "--no-steady-bones"}})
-    if (given)
-      throw InputError("", std::string(name) + " says nothing to --system " + type.name,
-                       "leave it out");
-}
-
-}  // namespace
-
-void check_options(const RetargetOptions& options, const SystemType& type) {
-  check_effect(options, type);
-  if (!(options.min_confidence >= 0 && options.min_confidence <= 1))
-    throw InputError("", "--min-confidence is out of range", "give 0 to 1");
-  if (options.samples < 1 || options.samples > 256)
-    throw InputError("", "--samples is out of range", "give 1 to 256");
-}
-
-void check_kept(const RetargetCommand& c, const TargetMesh& target) {
-  if (target.unknown_rig.empty() || !c.to.skeleton.empty()) return;
-  if (!text::ends_in(c.to.out, {".glb", ".gltf", ".vrm"})) return;
-  throw InputError(c.target, "its rig was not recognised: " + target.unknown_rig,
-                   "name its bones with --bones names.yaml; or, if its mesh stands in T-pose, "
-                   "facing +z, ask for a skeleton of ours with --skeleton restage");
-}
-
-void check_mesh(const RetargetCommand& c, const TargetMesh& target) {
-  if (c.options.force) return;
-  if (target.own) return check_sides(*target.joints, c.target);  // its rig says all else
-  with_target(c, target, [&] { check_target(target.mesh, c.target, target.known()); });
-}
-
-SystemInput load_input(const RetargetCommand& c, const Common& common) {
-  SystemInput input;
-  input.options = c.options;
-  input.options.seed = common.seed;
-  input.target_name = c.target;
-  const SystemType& type = system_type(c.system);
-  if (!c.rest.empty() && !type.own_skin)  // it moves vertices without joints
-    throw InputError("", "--rest says nothing to --system " + type.name, "leave it out");
-  for (const auto& [given, option] : {std::pair(&c.floor, "--floor"), {&c.contacts, "--contacts"}})
-    if (!given->empty() && std::count(type.roles.begin(), type.roles.end(), "skeleton") == 0)
-      throw InputError("", cat(option, " says nothing to --system ", type.name), "leave it out");
-  if (c.weights.empty() && type.roles.empty()) return input;
-  const std::string weights = c.weights.empty() ? standard_weights() : c.weights;
-  input.weights_name = weights_path(weights);
-  input.weights = load_bundle(weights);
-  std::vector<std::string> needed = type.roles;
-  if (!type.surface.empty()) needed.push_back(type.surface.front());
-  for (const std::string& role : needed) input.weights.need(role, input.weights_name);
-  move_networks(input.weights, with_late(type.roles), device_of(c.device));
-  return input;
-}
-
-SinkOptions sink_options(const RetargetCommand& c, const SystemInput& input,
-                         const TargetMesh& target) {
-  SinkOptions out = c.to;
-  // A rig has its joints where its maker wants them.
-  if (!target.own) out.definition = joints_given(c, input);
-  if (!out.joints.empty())
-    JointConversion(out.definition, out.joints,
-                    target.own       ? c.target
-                    : c.rest.empty() ? input.weights_name
-                                     : c.rest);
-  return out;
-}
-
-bool is_on(const std::string& asked, const RetargetCommand& c, const TargetMesh& target) {
-  if (!asked.empty()) return asked == "on";
-  return target.own || !(c.to.out.empty() || text::ends_in(c.to.out, {".h5", ".hdf5"}));
-}
-
-PartSurfaces average_surfaces() {
-  Body body = builtin_average_body();
-  const double leg = leg_length(body.joints);
-  for (Vec3& x : body.joints) x /= leg;
-  for (Point& p : body.rest.vertices) p /= static_cast<float>(leg);
-  return {body.rest, body.joints, body.weights};
-}
-
-std::unique_ptr<System> system_for(const RetargetCommand& c, SystemInput input,
-                                   TargetMesh& target) {
-  input.options.floor = is_on(c.floor, c, target);
-  if (is_on(c.contacts, c, target))
-    input.options.contacts = std::make_shared<PartSurfaces>(average_surfaces());
-  if (!c.rest.empty()) input.rest = rest_joints(c.rest);
-  joints_given(c, input);
-  if (target.own && !c.rest.empty())
-    throw InputError(c.target, "has a rig that says where its joints are", "leave --rest out");
-  input.own = target.own;
-  input.target = std::move(target.mesh);
-  return with_target(c, target,
-                     [&] { return make_system(system_type(c.system), std::move(input)); });
 }
 
 void add_retarget(Program& program) {

@@ -105,8 +105,8 @@ class BareDocument {
   }
   bool known() const { return document_ != nullptr; }
   void check(const std::string& out) const { document_->check_place(out); }
-  void write(const std::string& glb, const std::string& out) {
-    document_->wear(glb, file_);
+  void write(const std::string& glb, const JointMoves* unposed, const std::string& out) {
+    document_->wear(glb, file_, unposed);
     document_->write(out);
   }
 
@@ -133,10 +133,10 @@ Sink glb_sink(const SinkOptions& options, const Shown& shown, const std::string&
   if (!options.skeleton.empty()) how.skeleton = options.skeleton;
   const auto writer =
       std::make_shared<GlbWriter>(options.out, shown.target, rig.rest, rig.weights, how);
-  const auto commit = [writer, bare, out = options.out](const Frames& filled) {
+  const auto commit = [writer, bare, shown, out = options.out](const Frames& filled) {
     writer->set_filled(filled);
     if (bare->known())
-      bare->write(writer->bytes(), out);
+      bare->write(writer->bytes(), shown.unposed, out);
     else
       writer->commit();
     const InfluenceError e = writer->influence_error();

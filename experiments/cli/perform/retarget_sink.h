@@ -33,10 +33,11 @@ struct Sink {
   std::function<void(const std::vector<int64_t>& filled)> commit;
 };
 
-/// What is moved: the target, and its skeleton (null: none).
+/// What is moved: the target, its skeleton (null: none), and TargetMesh::unposed.
 struct Shown {
   const Mesh& target;
   const SystemRig* rig;
+  const JointMoves* unposed = nullptr;
 };
 
 /// InputError for an ending that cannot be written, and for options that do not go with it.

@@ -221,7 +221,8 @@ Retargeted run_take(const RetargetCommand& c, const Common& common, const Retarg
   std::optional<SystemRig> rig;
   if (target.own) rig.emplace(SystemRig{rest, weights});
   const Shown shown{target.own ? target.own->mesh() : system->target(),
-                    target.own ? &*rig : system->rig()};
+                    target.own ? &*rig : system->rig(),
+                    target.unposed ? &*target.unposed : nullptr};
   std::optional<SourceRecord> source;
   if (is_gltf_name(c.source.path)) source = c.source;
   const Sink sink = caller.sink ? in_joints(to, caller.sink(shown))
