@@ -143,6 +143,20 @@ Point clip_centre(const Points& points) {
   return centre;
 }
 
+ClipReach clip_reach(const Points& points, float floor) {
+  constexpr float kRoom = 1.3f;
+  const Point centre = clip_centre(points);
+  std::vector<float> away;
+  for (const Point& p : points)
+    if (p.allFinite()) away.push_back((p - centre).norm());
+  ClipReach out;
+  if (away.empty()) return out;
+  const float reach = kRoom * ranked(away, (away.size() - 1) * 98 / 100);
+  out.aside = std::max(out.aside, reach);
+  out.high = std::max(out.high, centre.y() - floor + reach);
+  return out;
+}
+
 std::vector<Point> calm_centres(const std::vector<Point>& centres, double fps) {
   std::vector<Point> calm;
   const auto reach = static_cast<std::ptrdiff_t>(std::lround(std::min(fps, 240.0) / 4));

@@ -49,6 +49,13 @@ void check_clips(const std::string& where, const std::vector<Clip>& clips);
 /// The point that the camera follows: the middle of the points' bounding box, without the outermost
 /// two per cent of the points on each side.
 Point clip_centre(const Points& points);
+/// How far a frame's points count for what the camera has to show, metres: to either side of the
+/// centre, and over the floor. Stray points may lie anywhere, but no person is larger than 3.2 m; a
+/// giant, most of whose points are, may be.
+struct ClipReach {
+  float aside = 1.6f, high = 3.2f;
+};
+ClipReach clip_reach(const Points& points, float floor);
 /// The middle of each frame, averaged with the middles of a quarter of a second before and after:
 /// the camera follows them calmly.
 std::vector<Point> calm_centres(const std::vector<Point>& centres, double fps);

@@ -42,13 +42,14 @@ Film::Film(const Clip& clip, const FilmOptions& options, std::vector<std::string
   centres_ = calm_centres(centres_, clip.fps);
   const float a = radians(options.azimuth);
   const Point right(std::cos(a), 0, -std::sin(a));
-  for (size_t f = 0; f < clip.frames.size(); ++f)
+  for (size_t f = 0; f < clip.frames.size(); ++f) {
+    const ClipReach reach = clip_reach(clip.frames[f], floor_);
     for (const Point& p : clip.frames[f]) {
       if (!p.allFinite()) continue;
-      // Stray points may lie anywhere, but no person is larger than this.
-      aside_ = std::max(aside_, std::min(std::abs(right.dot(p - centres_[f])), 1.6f));
-      high_ = std::max(high_, std::min(p.y() - floor_, 3.2f));
+      aside_ = std::max(aside_, std::min(std::abs(right.dot(p - centres_[f])), reach.aside));
+      high_ = std::max(high_, std::min(p.y() - floor_, reach.high));
     }
+  }
   const double per_metre = options.height / (1.16 * high_ + 0.12);
   const int wide = static_cast<int>(per_metre * (2.0 * aside_ + 0.16));
   const int fitting =

@@ -278,13 +278,15 @@ Packed pack(const Clip& clip, const PageSurface& surface, const Plan& plan, size
     counts.push_back(frames[f].size());
     middles.push_back(numbers(centres[f]));
     most = std::max(most, frames[f].size());
+    const ClipReach reach = clip_reach(frames[f], floor);
     for (const Point& p : frames[f]) {
       for (int k = 0; k < 3; ++k)
         data.push_back(static_cast<uint16_t>(
             std::lround(std::clamp((double{p[k]} - double{low[k]}) / step[k], 0.0, 65535.0))));
-      packed.height = std::max(packed.height, std::min(p.y() - floor, 3.2f));
+      packed.height = std::max(packed.height, std::min(p.y() - floor, reach.high));
       const Point aside = p - centres[f];
-      packed.width = std::max(packed.width, std::min(2 * std::hypot(aside.x(), aside.z()), 3.2f));
+      packed.width =
+          std::max(packed.width, std::min(2 * std::hypot(aside.x(), aside.z()), 2 * reach.aside));
     }
   }
   const double radius = std::clamp(0.42 * std::sqrt(1.8 / static_cast<double>(most)), 0.004, 0.016);

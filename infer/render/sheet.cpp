@@ -51,12 +51,12 @@ Layout lay_out(const std::vector<Clip>& clips, const SheetOptions& options) {
       const Points& points = clip.frames[moment];
       const Point centre = options.close_up > 0 ? clip.focus.at(moment) : clip_centre(points);
       layout.cells.back().push_back({&points, centre});
+      const ClipReach reach = clip_reach(points, floor);
       for (const Point& p : points) {
         if (!p.allFinite()) continue;
         const float aside = std::abs(right.dot(p - centre)), height = p.y() - floor;
-        // Stray points may lie anywhere, but no person is larger than this.
-        layout.half_width = std::max(layout.half_width, std::min(aside, 1.6f));
-        layout.high = std::max(layout.high, std::min(height, 3.2f));
+        layout.half_width = std::max(layout.half_width, std::min(aside, reach.aside));
+        layout.high = std::max(layout.high, std::min(height, reach.high));
       }
     }
   }

@@ -97,6 +97,21 @@ TEST(Clips, AreShownAtOneRate) {
   EXPECT_EQ(numbers(at_rate(clip, 60, 100)), numbers(clip));
 }
 
+TEST(Sheet, GiantsAreShownWholeAndStraysAreNot) {
+  Points person;
+  for (int i = 0; i < 1000; ++i)
+    person.emplace_back(0.2f * std::sin(static_cast<float>(i)), 0.0018f * static_cast<float>(i), 0);
+  Points stray = person, giant = person;
+  stray.emplace_back(20, 30, 0);
+  for (Point& p : giant) p *= 4;
+  for (const Points* usual : {&person, &stray}) {
+    EXPECT_EQ(clip_reach(*usual, 0).aside, 1.6f);
+    EXPECT_EQ(clip_reach(*usual, 0).high, 3.2f);
+  }
+  EXPECT_GT(clip_reach(giant, 0).high, 7.2f);
+  EXPECT_GT(clip_reach({}, 0).high, 0);
+}
+
 TEST(Sheet, MeshInFrontHidesWhatIsBehind) {
   const Points square = {{-1, 0.1f, 0}, {1, 0.1f, 0}, {1, 2, 0}, {-1, 2, 0}};
   const std::vector<Triangle> faces = {{0, 1, 2}, {0, 2, 3}};
