@@ -88,6 +88,8 @@ class Solve {
       keep_hands();
       for (const int side : {0, 1}) leave_parts(side);
     }
+    hold_hands();
+    for (const int side : {0, 1}) keep_unfolded(side);
     return moved_;
   }
 
@@ -108,7 +110,37 @@ class Solve {
       weights += weight;
       most = std::max(most, asked.weight);
     }
-    if (weights > 1e-12) moved_[static_cast<size_t>(side)] = most / weights * sum;
+    if (weights <= 1e-12) return;
+    const Vec3 by = sum / weights;
+    moved_[static_cast<size_t>(side)] = most * within_reach(side, by) * by;
+  }
+
+  /// What a short arm cannot reach is not reached for: the arm would go through the body. Nor is an
+  /// arm folded as none can be.
+  double within_reach(int side, const Vec3& by) const {
+    constexpr double kReach = 1, kBeyond = 1.25, kFolded = 0.4;  // of the arm
+    const auto at = [&](int joint) {
+      return target_.posed.joints[static_cast<size_t>(joint + side)];
+    };
+    const double arm = std::max(scale_ * arm_, 1e-9);
+    const double now = (at(kLeftWrist) - at(kLeftShoulder)).norm() / arm,
+                 far = (at(kLeftWrist) + by - at(kLeftShoulder)).norm() / arm;
+    const double least = std::min(now, kFolded);
+    return falling(far, kReach, kBeyond) * (1 - falling(far, 0.5 * least, least));
+  }
+  /// The same of what moves a hand out of parts.
+  void keep_unfolded(int side) {
+    constexpr double kFolded = 0.3;
+    const auto at = [&](int joint) {
+      return target_.posed.joints[static_cast<size_t>(joint + side)];
+    };
+    Vec3& by = moved_[static_cast<size_t>(side)];
+    const Vec3 now = at(kLeftWrist) - at(kLeftShoulder);
+    const double least = std::min(now.norm(), kFolded * scale_ * arm_);
+    const Vec3 then = now + by;
+    if (then.norm() >= least) return;
+    const Vec3 out = (then + 0.2 * now).normalized();
+    by = least * out - now;
   }
 
   Vec3 wanted(int side, const Asked& asked) const {
@@ -125,9 +157,18 @@ class Solve {
   /// Each wrist goes half of the way.
   void keep_hands() {
     if (hands_ <= 0) return;
-    const Vec3 off = scale_ * apart(source_) + thicker() - (apart(target_) + moved_[1] - moved_[0]);
-    moved_[0] -= 0.5 * hands_ * off;
-    moved_[1] += 0.5 * hands_ * off;
+    move_apart(thicker() + off());
+  }
+  /// Hands that are near each other matter more than what they go through.
+  void hold_hands() {
+    const double most = kThick * scale_ * arm_, far = off().norm();
+    if (hands_ > 0 && far > most) move_apart((1 - most / far) * off());
+  }
+  /// What lacks from the left wrist to the right one.
+  Vec3 off() const { return scale_ * apart(source_) - (apart(target_) + moved_[1] - moved_[0]); }
+  void move_apart(const Vec3& by) {
+    moved_[0] -= 0.5 * hands_ * by;
+    moved_[1] += 0.5 * hands_ * by;
   }
 
   /// How much farther apart the hands have to be not to go through each other deeper than the

@@ -13,7 +13,7 @@ namespace {
 
 constexpr int kViews = 16;
 constexpr size_t kPoints = 8192;
-constexpr double kStandsInT = 20;  // degrees
+constexpr double kStandsInT = 15;  // degrees
 
 /// Where the limbs of a T-pose point: arms by its definition, legs as those of MakeHuman's bodies,
 /// which differ by one or two degrees. A trunk is known less well.
@@ -87,6 +87,30 @@ void check_seen_again(SkeletonModel& skeleton, const Unposed& found, const std::
   if (worst < kJoints) refuse(where, worst);
 }
 
+/// A surface that has to stretch far went with two limbs at once.
+void check_whole(const Mesh& stood, const Unposed& found, const std::string& where) {
+  constexpr double kTimes = 3, kMost = 0.1;  // of its length, and metres
+  double most = kMost;
+  Point torn;
+  for (const Triangle& t : stood.faces)
+    for (size_t k = 0; k < 3; ++k) {
+      const auto a = static_cast<size_t>(t[k]), b = static_cast<size_t>(t[(k + 1) % 3]);
+      const double before = (stood.vertices[a] - stood.vertices[b]).norm(),
+                   after = (found.mesh.vertices[a] - found.mesh.vertices[b]).norm();
+      if (after < kTimes * before || after - before < most) continue;
+      most = after - before;
+      torn = 0.5f * (stood.vertices[a] + stood.vertices[b]);
+    }
+  if (most == kMost) return;
+  size_t nearest = 1;
+  const auto away = [&](size_t j) {
+    return (found.from[j].inverse() * found.rest[j] - torn.cast<double>()).norm();
+  };
+  for (size_t j = 2; j < kJoints; ++j)
+    if (away(j) < away(nearest)) nearest = j;
+  refuse(where, nearest);
+}
+
 /// The joint that moves a place of a part most.
 int joint_at(BodyPart part, const PlaceOnPart& place) {
   const double along = place.along;
@@ -158,8 +182,7 @@ void spread(const Mesh& mesh, SkinWeights* weights) {
 /// The parts of a mesh in any pose: each vertex belongs to the part of an average person in that
 /// pose whose surface is nearest and faces the same way, as its neighbours do.
 SkinWeights parts_of(const Mesh& mesh, const SeenJoints& seen, const PartSurfaces& average) {
-  const double kTurned = getenv("KU") ? atof(getenv("KU"))
-                                      : 0.06;  // metres that a surface is farther which faces away
+  constexpr double kTurned = 0.06;  // metres that a surface is farther which faces away
   SkinWeights out = SkinWeights::Zero(static_cast<Eigen::Index>(mesh.vertices.size()), kJoints);
   PosedSkeleton posed;
   posed.joints = seen.joints;
@@ -249,6 +272,7 @@ std::optional<Unposed> unpose(const Bundle& weights, const std::string& weights_
   for (int round = 0; round < kRounds; ++round)
     move_vertices(mesh, Surface(weights, weights_name, out.mesh, out.rest).weights(), &out);
   stand_on_floor(&out);
+  check_whole(mesh, out, where);
   check_seen_again(*skeleton, out, where, key.fold("again"));
   return out;
 }

@@ -20,7 +20,7 @@ struct Unposed {
 /// the parts of the mesh in T-pose; before that, `average` does, an average person whose legs are 1
 /// m long. Each vertex goes where the mean of its joints takes it.
 ///
-/// `mesh`: metres, in any pose and facing. Nothing: it stands in T-pose, within 20 degrees, and is
+/// `mesh`: metres, in any pose and facing. Nothing: it stands in T-pose, within 15 degrees, and is
 /// best taken as it is; or the weights give no rotations or no skin. InputError naming `where` and
 /// the limb that cannot be made out.
 std::optional<Unposed> unpose(const Bundle& weights, const std::string& weights_name,

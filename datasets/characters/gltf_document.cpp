@@ -193,8 +193,14 @@ struct GltfDocument::Worn {
 /// Puts parts of another document into this one.
 class GltfDocument::Tailor {
  public:
-  Tailor(State& state, const Worn& worn, const Gltf& file, const JointMoves* unposed)
-      : s_(state), worn_(worn), file_(file), rest_(gltf_rest(file)), unposed_(unposed) {
+  Tailor(State& state, const Worn& worn, const Gltf& file, const JointMoves* unposed,
+         const std::vector<int32_t>& vertex)
+      : s_(state),
+        worn_(worn),
+        file_(file),
+        rest_(gltf_rest(file)),
+        unposed_(unposed),
+        vertex_(vertex) {
     if (s_.has_binary) pad(s_.binary);
     buffer_ = s_.has_binary ? 0 : s_.list("buffers").size();
     first_node_ = s_.list("nodes").size();
@@ -238,7 +244,12 @@ class GltfDocument::Tailor {
     Json one = worn_.json["accessors"][accessor];
     const size_t width = all.size() / one["count"].get<size_t>();
     one["count"] = count;
-    return add(all.substr(first * width, count * width), std::move(one), kVertices);
+    if (vertex_.empty())
+      return add(all.substr(first * width, count * width), std::move(one), kVertices);
+    std::string some;
+    for (size_t v = first; v < first + count; ++v)
+      some += all.substr(static_cast<size_t>(vertex_.at(v)) * width, width);
+    return add(some, std::move(one), kVertices);
   }
 
   Json& scene() {
@@ -347,13 +358,15 @@ class GltfDocument::Tailor {
   const Gltf& file_;
   const GltfTransforms rest_;
   const JointMoves* unposed_;
+  const std::vector<int32_t>& vertex_;
   size_t buffer_ = 0, first_node_ = 0;
   std::optional<size_t> plain_skin_;
 };
 
-void GltfDocument::wear(const std::string& glb, const Gltf& file, const JointMoves* unposed) {
+void GltfDocument::wear(const std::string& glb, const Gltf& file, const JointMoves* unposed,
+                        const std::vector<int32_t>& vertex) {
   checked_kinds(state_->path,
-                [&] { Tailor(*state_, Worn(glb, state_->path), file, unposed).sew(); });
+                [&] { Tailor(*state_, Worn(glb, state_->path), file, unposed, vertex).sew(); });
 }
 
 void GltfDocument::keep_nodes_only() {

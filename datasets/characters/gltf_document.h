@@ -41,7 +41,9 @@ class GltfDocument {
   /// document. Everything else stays as it is: pictures, materials, texture coordinates, the order
   /// of vertices. A mesh whose node is moved goes to a node of its own, since a skin ignores that.
   /// `unposed`: what took the meshes to the T-pose for which `glb` was made; null: they stand so.
-  void wear(const std::string& glb, const Gltf& file, const JointMoves* unposed = nullptr);
+  /// `vertex`: of each vertex of the meshes the vertex of `glb`; empty: they are the same.
+  void wear(const std::string& glb, const Gltf& file, const JointMoves* unposed = nullptr,
+            const std::vector<int32_t>& vertex = {});
   /// Drops everything but nodes and scenes; nodes show nothing any more.
   void keep_nodes_only();
 

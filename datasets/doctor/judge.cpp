@@ -319,7 +319,10 @@ void judge_pose(Diagnosis& d, const PersonShape& shape, const ExamineOptions& op
   }
   if (target) f.weight = o.up_sure >= kPoseSure ? Weight::wrong : Weight::note;
   f.what = target ? "not a T-pose" : "not a T-pose (a target needs one, a source does not)";
-  f.fix = target ? "pose it with the arms along x and the legs straight down" : "";
+  f.fix = target
+              ? "pose it with the arms along x and the legs straight down; a mesh in an A-pose or "
+                "another calm pose is put into T-pose by retarget"
+              : "";
   if (!angles) {
     f.evidence = "no arms stretched out at the sides";
   } else if (arms <= kTPoseAngle) {

@@ -37,7 +37,11 @@ namespace {
 /// Two bones and what hangs on them: thigh, shin and foot, or upper arm, forearm and hand.
 struct Chain {
   int from, middle, end;
-  Vec3 bends;  ///< where the middle joint of a straight limb points, in the axes of `from`
+  Vec3 bends;       ///< where the middle joint of a straight limb points, in the axes of `from`
+  double straight;  ///< how much that counts
+  /// The middle joint stays where it is as far as it can (a leg that moves little), or goes round
+  /// with the limb's line (an arm, which may move far: it would flip).
+  bool goes_round;
 };
 
 /// Moves the end of the chain by `offset` as far as it reaches; the end keeps its orientation, the
@@ -53,7 +57,11 @@ void move_end(const Joints& rest, const Chain& chain, const Vec3& offset, Pose* 
   const double reach =
       std::clamp(wanted.norm(), std::abs(upper - lower) + 1e-4, kStretched * (upper + lower));
   const Vec3 along = wanted.normalized();
-  const Vec3 bent = (k - h) + 1e-3 * upper * (posed.global[from] * chain.bends);
+  Vec3 bent = (k - h) + chain.straight * upper * (posed.global[from] * chain.bends);
+  if (chain.goes_round) {
+    const Vec3 before = (a - h).normalized();
+    bent = shortest_arc(before, along) * (bent - before.dot(bent) * before);
+  }
   Vec3 across = bent - along.dot(bent) * along;
   if (!(across.norm() > 1e-9)) return;
   across.normalize();
@@ -71,11 +79,12 @@ void move_end(const Joints& rest, const Chain& chain, const Vec3& offset, Pose* 
 }  // namespace
 
 void move_foot(const Joints& rest, int side, const Vec3& offset, Pose* pose) {
-  move_end(rest, {1 + side, 4 + side, 7 + side, Vec3::UnitZ()}, offset, pose);
+  move_end(rest, {1 + side, 4 + side, 7 + side, Vec3::UnitZ(), 1e-3, false}, offset, pose);
 }
 
 void move_hand(const Joints& rest, int side, const Vec3& offset, Pose* pose) {
-  move_end(rest, {kLeftShoulder + side, kLeftElbow + side, kLeftWrist + side, -Vec3::UnitZ()},
+  move_end(rest,
+           {kLeftShoulder + side, kLeftElbow + side, kLeftWrist + side, -Vec3::UnitZ(), 0.1, true},
            offset, pose);
 }
 

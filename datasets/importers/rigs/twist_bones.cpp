@@ -29,9 +29,24 @@ Mat3 about(const Vec3& line, double angle) {
   return Eigen::AngleAxisd(angle, line).toRotationMatrix();
 }
 
+bool is_small(char c) { return c >= 'a' && c <= 'z'; }
+
+/// Whether the name has the word: "ForeArmRoll" and "forearm_roll.L" have "roll", "Scroll" has not.
+bool has_word(const std::string& name, const std::string& word) {
+  const std::string low = lower_case(name);
+  for (size_t at = low.find(word); at != low.npos; at = low.find(word, at + 1)) {
+    const size_t end = at + word.size();
+    const bool begins = at == 0 || !is_small(name[at]) || !is_small(name[at - 1]);
+    if (begins && (end == name.size() || !is_small(name[end]))) return true;
+  }
+  return false;
+}
+
 bool is_called_twist(const std::string& name) {
   const std::string low = lower_case(name);
-  return low.find("twist") != std::string::npos || low.find("roll") != std::string::npos;
+  const bool called =
+      low.find("twist") != low.npos || low.find("armroll") != low.npos || has_word(name, "roll");
+  return called && !has_word(name, "end");
 }
 
 /// Whether the next joint of the limb hangs on the node.

@@ -2,8 +2,10 @@
 // names it in errors. `origin` is taken off every vertex before it becomes a float.
 #pragma once
 
+#include <array>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "datasets/readers/clouds/non_finite.h"
 
@@ -12,8 +14,11 @@ namespace restage {
 /// Faces of one or two corners (points and lines) make no triangles.
 Mesh parse_obj(std::string_view content, const std::string& path, const Vec3& origin = Vec3::Zero(),
                NonFinite how = NonFinite::refuse);
+/// `colours`: gets the vertices' red, green, blue and alpha, 0 to 1 as the file has them (sRGB), if
+/// it has any; may be null.
 Mesh parse_ply(std::string_view content, const std::string& path, const Vec3& origin = Vec3::Zero(),
-               NonFinite how = NonFinite::refuse);
+               NonFinite how = NonFinite::refuse,
+               std::vector<std::array<float, 4>>* colours = nullptr);
 
 /// PCD of the Point Cloud Library: ascii, binary and binary_compressed; of the fields x, y and z
 /// count, as numbers of any kind. The sensor's place (VIEWPOINT) changes nothing.

@@ -1,6 +1,7 @@
 #include <algorithm>
 
 #include "datasets/readers/clouds/mesh_parsers.h"
+#include "datasets/readers/clouds/obj_lines.h"
 #include "datasets/readers/errors.h"
 #include "datasets/readers/text/text.h"
 
@@ -34,29 +35,6 @@ int32_t parse_corner(std::string_view word, size_t vertices, const Where& where)
                      "correct the face");
   return static_cast<int32_t>(zero_based);
 }
-
-/// Lines of an OBJ file; `\` at the end of a vertex or face joins the next one to it.
-class ObjLines {
- public:
-  explicit ObjLines(std::string_view content) : lines_(content) {}
-  bool next(std::string_view& line) {
-    if (!lines_.next(line)) return false;
-    if (!line.ends_with('\\') || (line[0] != 'v' && line[0] != 'f')) return true;
-    joined_ = line;
-    while (joined_.ends_with('\\')) {
-      joined_.back() = ' ';
-      if (!lines_.next(line)) break;
-      joined_ += line;
-    }
-    line = joined_;
-    return true;
-  }
-  int64_t number() const { return lines_.number(); }
-
- private:
-  text::Lines lines_;
-  std::string joined_;
-};
 
 }  // namespace
 

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <array>
 #include <cmath>
 
@@ -208,8 +209,17 @@ void skip_property(Rows& rows, const Property& property) {
   for (size_t i = 0; i < n; ++i) rows.next(*property.type);
 }
 
+using Colours = std::vector<std::array<float, 4>>;
+
+/// Where the property belongs in a colour, or -1.
+int colour_channel(const Property& p) {
+  static constexpr std::array<std::string_view, 4> kNames = {"red", "green", "blue", "alpha"};
+  const auto at = std::find(kNames.begin(), kNames.end(), lower_case(p.name));
+  return p.count || at == kNames.end() ? -1 : static_cast<int>(at - kNames.begin());
+}
+
 void read_vertices(Rows& rows, const Element& element, const std::string& path, const Vec3& origin,
-                   NonFinite how, Points& points) {
+                   NonFinite how, Points& points, Colours* colours) {
   std::array<int, 3> axis_seen = {0, 0, 0};
   std::vector<int> axis_of;  // for each property: 0, 1, 2 or -1
   for (const Property& p : element.properties) {
@@ -219,13 +229,25 @@ void read_vertices(Rows& rows, const Element& element, const std::string& path, 
   }
   if (axis_seen != std::array<int, 3>{1, 1, 1})
     throw InputError(path, "the vertices do not have the properties x, y and z", kExportAgain);
+  std::vector<int> channel_of;
+  int coloured = 0;
+  for (const Property& p : element.properties) {
+    channel_of.push_back(colours == nullptr ? -1 : colour_channel(p));
+    if (channel_of.back() >= 0 && channel_of.back() < 3) coloured |= 1 << channel_of.back();
+  }
   points.reserve(points.size() + element.count);
   for (uint64_t i = 0; i < element.count; ++i) {
     rows.begin_row();
     Point point = Point::Zero();
+    std::array<float, 4> colour = {1, 1, 1, 1};
     for (size_t k = 0; k < axis_of.size(); ++k) {
-      if (axis_of[k] < 0)
-        skip_property(rows, element.properties[k]);
+      const Property& property = element.properties[k];
+      if (coloured == 7 && channel_of[k] >= 0) {
+        const double whole = !property.type->integer ? 1 : property.type->bytes == 1 ? 255 : 65535;
+        colour[static_cast<size_t>(channel_of[k])] =
+            static_cast<float>(std::clamp(rows.next(*property.type) / whole, 0.0, 1.0));
+      } else if (axis_of[k] < 0)
+        skip_property(rows, property);
       else
         point[axis_of[k]] = text::coordinate(
             rows.next(*element.properties[k].type) - origin[axis_of[k]],
@@ -233,6 +255,7 @@ void read_vertices(Rows& rows, const Element& element, const std::string& path, 
     }
     rows.end_row();
     points.push_back(point);
+    if (coloured == 7) colours->push_back(colour);
   }
 }
 
@@ -263,8 +286,8 @@ void read_faces(Rows& rows, const Element& element, std::vector<Triangle>& faces
 
 }  // namespace
 
-Mesh parse_ply(std::string_view content, const std::string& path, const Vec3& origin,
-               NonFinite how) {
+Mesh parse_ply(std::string_view content, const std::string& path, const Vec3& origin, NonFinite how,
+               Colours* colours) {
   text::Lines lines(content);
   const PlyHeader header = parse_header(lines, path);
   Rows rows(lines, header, path);
@@ -272,7 +295,7 @@ Mesh parse_ply(std::string_view content, const std::string& path, const Vec3& or
   for (const Element& element : header.elements) {
     rows.begin(element);
     if (element.name == "vertex") {
-      read_vertices(rows, element, path, origin, how, mesh.vertices);
+      read_vertices(rows, element, path, origin, how, mesh.vertices, colours);
     } else if (element.name == "face") {
       read_faces(rows, element, mesh.faces);
     } else {

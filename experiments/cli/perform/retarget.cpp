@@ -285,8 +285,9 @@ Retargeted retarget(const RetargetCommand& c, const Common& common, RetargetCall
 }
 
 void add_target_options(CommandOptions app, RetargetCommand& c) {
-  app.add_option("--target,TARGET", c.target,
-                 "mesh or cloud in T-pose, y up, facing +z; or a glTF or FBX character")
+  app.add_option(
+         "--target,TARGET", c.target,
+         "a glTF or FBX character; or a mesh or cloud of somebody, y up, best in T-pose facing +z")
       .required();
   app.add_option(
       "--bones", c.bones,
@@ -312,9 +313,11 @@ void add_system_options(CommandOptions app, RetargetCommand& c) {
                  "on: soles stand on the floor, and no foot goes below it; off (default: on, but "
                  "for X.h5 of a target without bones)")
       .one_of({"on", "off"});
-  app.add_option("--contacts", c.contacts,
-                 "on: hands touch what the source's hands touch, and go through nothing; off "
-                 "(default: as of --floor)")
+  app.add_option(
+         "--contacts", c.contacts,
+         "on: arms are moved so that hands touch what the source's hands touch, and go no deeper "
+         "into the body; off (default: on, but for X.h5 of a target without bones, and for "
+         "arms and trunks like the source's)")
       .one_of({"on", "off"});
   app.add_flag("!--no-keep-limbs", c.options.keep_limbs,
                "legs and arms that cross are named as each frame shows them");

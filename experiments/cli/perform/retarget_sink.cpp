@@ -8,6 +8,7 @@
 #include "autograd/base/log.h"
 #include "datasets/characters/gltf_clip.h"
 #include "datasets/characters/gltf_document.h"
+#include "datasets/characters/mesh_document.h"
 #include "datasets/characters/mesh_template.h"
 #include "datasets/frame_writer.h"
 #include "datasets/readers/text/text.h"
@@ -93,32 +94,41 @@ Sink vrma_sink(const SinkOptions& options, const Shown& shown, const std::string
                           [writer](const Frames&) { writer->commit(); }});
 }
 
-/// The document of a glTF or FBX target without bones, which keeps everything that it holds and
-/// gets a skeleton of ours. Not known: of another kind, or with bones that were not recognised.
+/// The document of a target without bones, which keeps everything that it holds and gets a skeleton
+/// of ours: a glTF or FBX file, or an OBJ or PLY file that has more than its shape. Not known: of
+/// another kind, or with bones that were not recognised. `vertices`: how many were read from it.
 class BareDocument {
  public:
-  explicit BareDocument(const std::string& target) {
-    if (!is_gltf_name(target)) return;
-    content_ = read_gltf_bytes(target);
+  BareDocument(const std::string& target, size_t vertices) {
+    if (is_gltf_name(target)) {
+      content_ = read_gltf_bytes(target);
+    } else if (std::optional<MeshDocument> made = mesh_document(target, vertices)) {
+      content_ = std::move(made->glb);
+      vertex_ = std::move(made->vertex);
+      for (const std::string& remark : made->remarks) log_warning(target + ": " + remark);
+    } else {
+      return;
+    }
     file_ = parse_gltf(content_, target);
     if (file_.skin_nodes.empty()) document_ = std::make_unique<GltfDocument>(content_, target);
   }
   bool known() const { return document_ != nullptr; }
   void check(const std::string& out) const { document_->check_place(out); }
   void write(const std::string& glb, const JointMoves* unposed, const std::string& out) {
-    document_->wear(glb, file_, unposed);
+    document_->wear(glb, file_, unposed, vertex_);
     document_->write(out);
   }
 
  private:
   std::string content_;
+  std::vector<int32_t> vertex_;
   Gltf file_;
   std::unique_ptr<GltfDocument> document_;
 };
 
 /// A GLB file for a target without bones that we know. The file gets a skeleton and a skin of ours.
 Sink glb_sink(const SinkOptions& options, const Shown& shown, const std::string& target) {
-  const auto bare = std::make_shared<BareDocument>(target);
+  const auto bare = std::make_shared<BareDocument>(target, shown.target.vertices.size());
   if (!text::ends_in(options.out, {".glb"}) &&
       !(bare->known() && text::ends_in(options.out, {".gltf"})))
     throw InputError(options.out, "keeps the target's own file, which has no rig that we know",

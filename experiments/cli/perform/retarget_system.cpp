@@ -143,16 +143,29 @@ PartSurfaces average_surfaces() {
 
 namespace {
 
+/// By its shape alone.
+bool stands_in_t_pose(const RetargetCommand& c, const TargetMesh& target) {
+  try {
+    check_by_doctor(c, target, false);
+    return true;
+  } catch (const InputError&) {
+    return false;
+  }
+}
+
 /// A mesh that stands otherwise is put into T-pose, where the weights can.
 void take_t_pose(const RetargetCommand& c, SystemInput& input, TargetMesh& target) {
-  std::optional<Unposed> found = with_target(c, target, [&] {
-    return unpose(input.weights, input.weights_name, target.mesh, c.target, average_surfaces(),
-                  input.options.seed);
-  });
-  if (!found) {
-    if (!c.options.force) check_by_doctor(c, target, false);
-    return;
+  std::optional<Unposed> found;
+  try {
+    found = with_target(c, target, [&] {
+      return unpose(input.weights, input.weights_name, target.mesh, c.target, average_surfaces(),
+                    input.options.seed);
+    });
+    if (!found && !c.options.force) check_by_doctor(c, target, false);
+  } catch (const InputError&) {
+    if (!c.options.force && !stands_in_t_pose(c, target)) throw;
   }
+  if (!found) return;
   log_info(c.target +
            format(": was put into T-pose (a limb was %.0f degrees from it)", found->farthest));
   target.mesh = std::move(found->mesh);

@@ -181,17 +181,43 @@ class Hands {
     return unlike(take_, rest_, {3, 6, 9, 12, 13, 14, 15, 16, 17, 18, 19, 20, 21}) > kSame;
   }
 
-  void operator()(size_t frame, Pose* pose) const {
-    const BodyInPose source{theirs_, take_.frames[frame], size_};
-    move_hands(rest_, contacts_.moves(source, rest_, *pose), pose);
+  /// Looks at the whole take: `poses`, one a frame. What moves the hands begins and ends within
+  /// some frames before and after a touch.
+  void prepare(const std::vector<Pose>& poses) {
+    std::vector<std::array<Vec3, 2>> exact;
+    for (size_t f = 0; f < poses.size(); ++f)
+      exact.push_back(contacts_.moves({theirs_, take_.frames[f], size_}, rest_, poses[f]));
+    moves_ = smoothed(exact);
   }
 
+  void operator()(size_t frame, Pose* pose) const { move_hands(rest_, moves_[frame], pose); }
+
  private:
+  /// A bell over the frames around.
+  static std::vector<std::array<Vec3, 2>> smoothed(const std::vector<std::array<Vec3, 2>>& exact) {
+    constexpr int kWidth = 2, kReach = 3 * kWidth;  // frames
+    std::vector<std::array<Vec3, 2>> out(exact.size(), {Vec3::Zero(), Vec3::Zero()});
+    for (size_t f = 0; f < exact.size(); ++f) {
+      double all = 0;
+      for (int k = -kReach; k <= kReach; ++k) {
+        const auto at = static_cast<std::ptrdiff_t>(f) + k;
+        if (at < 0 || at >= std::ssize(exact)) continue;
+        const double weight = std::exp(-0.5 * k * k / (kWidth * kWidth));
+        all += weight;
+        for (size_t side = 0; side < 2; ++side)
+          out[f][side] += weight * exact[static_cast<size_t>(at)][side];
+      }
+      for (Vec3& by : out[f]) by /= all;
+    }
+    return out;
+  }
+
   const SkeletonTake& take_;
   const Joints& rest_;
   Contacts contacts_;
   PartSurfaces theirs_;
   double size_;
+  std::vector<std::array<Vec3, 2>> moves_;
 };
 
 }  // namespace
@@ -236,12 +262,17 @@ Retargeted run_take(const RetargetCommand& c, const Common& common, const Retarg
   std::optional<Hands> hands;
   if (is_on(c.contacts, c, target) && shown.rig != nullptr) hands.emplace(take, shown);
   if (hands && c.contacts.empty() && !hands->is_needed()) hands.reset();
+  std::vector<Pose> poses;
+  for (size_t f = 0; f < take.frames.size(); ++f) {
+    poses.push_back(perform_take(take, f, rest));
+    if (floor) (*floor)(f, &poses.back());
+  }
+  if (hands) hands->prepare(poses);
   int64_t frames = 0;
   for (size_t f = 0; f < take.frames.size(); f += static_cast<size_t>(c.to.every)) {
     caller.look();
     RetargetedFrame frame;
-    frame.pose = perform_take(take, f, rest);
-    if (floor) (*floor)(f, &frame.pose);
+    frame.pose = poses[f];
     if (hands) (*hands)(f, &frame.pose);
     frame.joints.emplace();
     if (!take.fingers.empty()) frame.fingers = take.fingers[f];
