@@ -10,7 +10,7 @@ ROOT = pathlib.Path(__file__).resolve().parents[1]
 DECISIONS = ROOT / "docs/decisions.md"
 REFERENCE = ROOT / "docs/config_reference.md"  # a test asks for each of its rows
 # Of README.md and docs without these two pages and what is generated below docs/reproduction; of the first of them.
-MOST_WORDS, MOST_DECISIONS = 23_000, 4_000
+MOST_WORDS, MOST_DECISIONS = 24_000, 4_000
 faults = []
 
 

@@ -33,7 +33,7 @@ class RetargetOptions(TypedDict, total=False):
     min_confidence: float | None  # the target waits where the extractor is less sure than this, 0 to 1 (0: never), and comes back within half a second (default: 0)
     foot_lock: bool  # False: feet that stand are not held where they landed
     floor: Literal["on", "off"] | None  # on: soles stand on the floor, and no foot goes below it; off (default: on, but for X.h5 of a target without bones)
-    contacts: Literal["on", "off"] | None  # on: hands touch what the source's hands touch, and go through nothing; off (default: as of --floor)
+    contacts: Literal["on", "off"] | None  # on: arms are moved so that hands touch what the source's hands touch, and go no deeper into the body; off (default: on, but for X.h5 of a target without bones, and for arms and trunks like the source's)
     keep_limbs: bool  # False: legs and arms that cross are named as each frame shows them
     steady_bones: bool  # False: the source's bones are as long as each frame shows them
     online: bool  # every frame is answered at once, as in 'restage stream'; else weights that can look two frames ahead do so
@@ -54,7 +54,7 @@ class SystemOptions(TypedDict, total=False):
     min_confidence: float | None  # the target waits where the extractor is less sure than this, 0 to 1 (0: never), and comes back within half a second (default: 0)
     foot_lock: bool  # False: feet that stand are not held where they landed
     floor: Literal["on", "off"] | None  # on: soles stand on the floor, and no foot goes below it; off (default: on, but for X.h5 of a target without bones)
-    contacts: Literal["on", "off"] | None  # on: hands touch what the source's hands touch, and go through nothing; off (default: as of --floor)
+    contacts: Literal["on", "off"] | None  # on: arms are moved so that hands touch what the source's hands touch, and go no deeper into the body; off (default: on, but for X.h5 of a target without bones, and for arms and trunks like the source's)
     keep_limbs: bool  # False: legs and arms that cross are named as each frame shows them
     steady_bones: bool  # False: the source's bones are as long as each frame shows them
     online: bool  # False: weights that can look two frames ahead do so
