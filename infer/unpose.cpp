@@ -56,7 +56,7 @@ double farthest(const Joints& joints) {
 [[noreturn]] void refuse(const std::string& where, size_t joint) {
   const char* name = "trunk";
   for (const LimbInT& limb : limbs())
-    if (limb.to == joint) name = limb.name;
+    if (limb.to == joint || limb.from == joint) name = limb.name;
   throw InputError(where,
                    cat("is not in T-pose, and its ", name, " cannot be made out in its pose"),
                    "give the target in T-pose or A-pose, whole, with arms and legs apart");

@@ -333,10 +333,12 @@ class AnyPose(CliTest):
         self.assertLess(off[len(off) * 9 // 10], 0.06)
 
     def test_what_cannot_be_made_out_is_named(self):
-        hero = self.person(frames=2)
-        knot = [(x * (0.3 + 0.5 * math.cos(9 * y)), y, z + 0.4 * abs(x) * math.sin(7 * y)) for x, y, z in hero]
-        self.ply("knot.ply", knot)
-        self.bad_input(["retarget", "--source", "data.h5", "--sequence", "0", "--target", "knot.ply", "--weights", STANDARD, "--out", "x.glb"], "knot.ply")
+        self.posed("down.ply", 95)  # the hands are in the thighs
+        call = ["retarget", "--source", "data.h5", "--sequence", "0", "--target", "down.ply", "--weights", STANDARD, "--out", "x.glb"]
+        refused = self.restage(*call)
+        self.assertEqual(refused.code, 2)
+        self.assertRegex(refused.err, r"down.ply: is not in T-pose, and its (left|right) (arm|leg) cannot be made out in its pose; ")
+        self.done(*call, "--force")
 
 
 if __name__ == "__main__":

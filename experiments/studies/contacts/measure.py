@@ -102,7 +102,7 @@ def main():
         rows.append({"file": os.path.basename(path), "inside_percent": 100 * inside.mean(), "jolts_mm": jolts.mean(), "largest_jolt_mm": jolts.max()})
         if close.any():
             rows[-1].update(wrists_off=np.abs(wrists - source[0])[close].mean(), wrists_most_off=np.abs(wrists - source[0])[close].max())
-        if touch.any():
+        if touch.any() and np.isfinite(near).all():  # a file whose trunk hangs on an arm has none
             rows[-1].update(near_arms=near[touch].mean())
         rows[-1] = {k: v if isinstance(v, str) else round(float(v), 3) for k, v in rows[-1].items()}
         print(json.dumps(rows[-1]))
