@@ -49,8 +49,8 @@ struct TargetMesh {
   /// Of a file without a skin which meshes it is made of, and why its nodes are no body's; else
   /// empty.
   std::string parts, unknown_parts;
-  /// What took a mesh without a rig from the pose in which it stands to the T-pose (infer/unpose.h);
-  /// nothing: it stands in T-pose.
+  /// What took a mesh without a rig from the pose in which it stands to the T-pose
+  /// (infer/unpose.h); nothing: it stands in T-pose.
   std::optional<JointMoves> unposed;
   /// What the doctor need not guess of it.
   ExamineOptions known() const;
