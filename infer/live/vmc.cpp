@@ -56,10 +56,11 @@ VmcSender::VmcSender(const Place& to, const Joints& rest, const BoneSet& sent)
   if (!sent_[kPelvis]) throw WorkError("a character without hips cannot be sent");
 }
 
-std::string VmcSender::send(const Pose& pose, double seconds) {
+std::string VmcSender::send(const Pose& pose, double seconds, bool tracked) {
   lo_bundle bundle = lo_bundle_new(LO_TT_IMMEDIATE);
   lo_message loaded = lo_message_new(), time = lo_message_new();
-  lo_message_add(loaded, "i", 1);
+  constexpr int kLoaded = 1, kCalibrated = 3, kUsualMode = 0;
+  lo_message_add(loaded, "iiii", kLoaded, kCalibrated, kUsualMode, tracked ? 1 : 0);
   lo_bundle_add_message(bundle, "/VMC/Ext/OK", loaded);
   lo_message_add(time, "f", seconds);
   lo_bundle_add_message(bundle, "/VMC/Ext/T", time);

@@ -36,9 +36,11 @@ class VmcSender {
   /// `to`: resolved().
   VmcSender(const Place& to, const Joints& rest, const BoneSet& sent);
   /// One bundle: /VMC/Ext/OK, /VMC/Ext/T, /VMC/Ext/Root/Pos (always the origin) and
-  /// /VMC/Ext/Bone/Pos for every bone. `seconds`: since the stream began. Returns why it could not
-  /// be sent; empty: it has been handed to the socket.
-  std::string send(const Pose& pose, double seconds);
+  /// /VMC/Ext/Bone/Pos for every bone. `seconds`: since the stream began. `tracked`: whether
+  /// somebody is seen now, as /VMC/Ext/OK says since version 2.7 of the protocol (loaded,
+  /// calibrated, in the usual mode, tracked). Returns why it could not be sent; empty: it has been
+  /// handed to the socket.
+  std::string send(const Pose& pose, double seconds, bool tracked = true);
 
  private:
   Datagrams to_;

@@ -104,13 +104,18 @@ class Receiver:
         self.socket.bind(("127.0.0.1", 0))
         self.port = self.socket.getsockname()[1]
 
-    def next(self, seconds=10):
-        """The next bundle; None: none came."""
-        self.socket.settimeout(seconds)
-        try:
-            return osc_bundle(self.socket.recv(65536))
-        except socket.timeout:
-            return None
+    def next(self, seconds=10, tracked=1):
+        """The next bundle that says somebody is (1) or is not (0) seen; None: none came."""
+        until = time.monotonic() + seconds
+        while (left := until - time.monotonic()) > 0:
+            self.socket.settimeout(left)
+            try:
+                bundle = osc_bundle(self.socket.recv(65536))
+            except socket.timeout:
+                return None
+            if any(path == "/VMC/Ext/OK" and values[-1] == tracked for path, _, values in bundle):
+                return bundle
+        return None
 
     def all(self, seconds=0.5):
         out = []
@@ -204,12 +209,29 @@ class Streams(StreamTest):
         for path, types, _ in bundles[-1]:
             messages.setdefault(path, []).append(types)
         self.assertEqual({path: (len(types), set(types)) for path, types in messages.items()},
-                         {"/VMC/Ext/OK": (1, {"i"}), "/VMC/Ext/T": (1, {"f"}), "/VMC/Ext/Root/Pos": (1, {"sfffffff"}),
+                         {"/VMC/Ext/OK": (1, {"iiii"}), "/VMC/Ext/T": (1, {"f"}), "/VMC/Ext/Root/Pos": (1, {"sfffffff"}),
                           "/VMC/Ext/Bone/Pos": (22, {"sfffffff"})})
         document, _ = self.interrupted(process)
         self.assertEqual((document["frames_in"], document["frames_out"]), (16, 16))
         latency = document["latency_ms"]
         self.assertTrue(0 < latency["p50"] <= latency["p99"] <= latency["max"], latency)
+
+    def test_while_the_source_is_silent_the_last_pose_goes_on(self):
+        process = self.stream("-")
+        first = self.answer(lambda data: (process.stdin.write(data), process.stdin.flush()), self.clouds[0], 0)
+        silent = [self.receiver.next(tracked=0) for _ in range(10)]
+        begun = time.monotonic()
+        silent += [self.receiver.next(tracked=0) for _ in range(15)]
+        self.assertGreater(time.monotonic() - begun, 0.3)  # 30 a second, no more
+        for bundle in silent:
+            self.assertEqual(joints_of(bundle), joints_of(first))
+        # Whoever moves again is seen again.
+        self.assertIsNotNone(self.answer(lambda data: (process.stdin.write(data), process.stdin.flush()), self.clouds[1], 2))
+        process.stdin.close()
+        process.stdin = None
+        document, _ = self.ended(process)
+        self.assertEqual(document["frames_out"], 2)
+        self.assertGreaterEqual(document["repeated"], 25)
 
     def test_a_rigged_target_moves_by_its_own_bones(self):
         character(self.path("hero.glb"))

@@ -385,7 +385,7 @@ TEST(LiveVmc, ABundleIsReadByAReceiver) {
   EXPECT_EQ(sender.send(pose, 2.5), "");
   ASSERT_GT(lo_server_recv_noblock(server, 2000), 0);
   EXPECT_EQ(got.bundles, 1);
-  EXPECT_EQ(got.numbers["/VMC/Ext/OK"], std::vector<float>{1});
+  EXPECT_EQ(got.numbers["/VMC/Ext/OK"], (std::vector<float>{1, 3, 0, 1}));
   EXPECT_EQ(got.numbers["/VMC/Ext/T"], std::vector<float>{2.5f});
   EXPECT_EQ(got.numbers["/VMC/Ext/Root/Pos root"], (std::vector<float>{0, 0, 0, 0, 0, 0, 1}));
   for (const VmcBone& bone : vmc_bones(rest, pose, bones_without({}))) {

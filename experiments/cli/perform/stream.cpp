@@ -142,7 +142,7 @@ class Stream {
 
   /// Until the input ends, the time is over or a signal comes.
   void run() {
-    constexpr std::chrono::milliseconds kLook{20}, kClose{2};
+    constexpr std::chrono::milliseconds kLook{10}, kClose{2};
     while (!stop_requested() && !(c_.seconds && lasted() >= *c_.seconds)) {
       if (box_.take(come_, waits_ ? kClose : kLook)) {
         place();
@@ -152,6 +152,8 @@ class Stream {
         answer();
       } else if (box_.ended()) {
         return;
+      } else {
+        go_on();
       }
     }
     late_ += waits_.has_value();
@@ -244,6 +246,7 @@ class Stream {
 
   void send(const RetargetedFrame& frame) {
     const double seconds = lasted();
+    sent_ = answered_ = live::Clock::now();
     const std::string trouble = vmc_.send(frame.pose, seconds);
     if (!trouble.empty()) {
       ++unsent_;
@@ -256,6 +259,15 @@ class Stream {
       page_->send(live::frame_message(seconds, frame.confidence.value_or(NAN), frame.vertices));
   }
 
+  /// While the source is silent, the last pose goes on, so that a receiver can tell a pause from a
+  /// program that is gone; the page needs no more pictures of it.
+  void go_on() {
+    constexpr double kSilent = 0.25;  // seconds
+    if (out_ == 0 || since(answered_) < kSilent || since(sent_) < 1 / kFps) return;
+    sent_ = live::Clock::now();
+    if (vmc_.send(newest_.pose, lasted(), false).empty()) ++repeated_;
+  }
+
   const StreamCommand& c_;
   const ToOurs to_ours_;
   CloudDoor door_;
@@ -265,6 +277,7 @@ class Stream {
   live::Mailbox& box_;
   live::Words& words_;
   const live::Clock::time_point begun_ = live::Clock::now();
+  live::Clock::time_point sent_ = begun_, answered_ = begun_;  ///< the last pose; the last new one
   live::SenderClock clock_;
   live::Timeline timeline_;
   live::LatencyMeter latency_;
@@ -273,7 +286,8 @@ class Stream {
   std::optional<live::Clock::time_point> waits_;  ///< the cloud is early: how long it waits
   bool going_ = false;             ///< the system has answered a cloud of this sequence
   int64_t missed_ = 0, told_ = 0;  ///< moments since the last answer; those the system knows of
-  int64_t out_ = 0, late_ = 0, late_in_a_row_ = 0, unusable_ = 0, unsent_ = 0, restarts_ = 0;
+  int64_t out_ = 0, late_ = 0, late_in_a_row_ = 0, unusable_ = 0, unsent_ = 0, restarts_ = 0,
+          repeated_ = 0;
   size_t left_out_ = 0;
 };
 
@@ -305,6 +319,7 @@ Json Stream::json() const {
             {"unanswered", unanswered}}},
           {"points_left_out", left_out_},
           {"restarts", restarts_},
+          {"repeated", repeated_},
           {"seconds", lasted()},
           {"latency_ms", latency}};
 }
