@@ -255,7 +255,7 @@ void stand_on_floor(Unposed* out) {
 std::optional<Unposed> unpose(const Bundle& weights, const std::string& weights_name,
                               const Mesh& mesh, const std::string& where,
                               const PartSurfaces& average, uint64_t seed) {
-  constexpr int kRounds = 2;
+  constexpr int kSkins = 2;
   auto* skeleton = weights.find_as<SkeletonModel>("skeleton");
   if (skeleton == nullptr || weights.find("deformation.weights") == nullptr) return {};
   const RngKey key = RngKey{seed, 0}.fold("unpose");
@@ -269,7 +269,7 @@ std::optional<Unposed> unpose(const Bundle& weights, const std::string& weights_
   out.mesh = mesh;
   take_back(seen, &out);
   move_vertices(mesh, parts_of(mesh, seen, average), &out);
-  for (int round = 0; round < kRounds; ++round)
+  for (int skin = 0; skin < kSkins; ++skin)
     move_vertices(mesh, Surface(weights, weights_name, out.mesh, out.rest).weights(), &out);
   stand_on_floor(&out);
   check_whole(mesh, out, where);
