@@ -144,7 +144,7 @@ Point clip_centre(const Points& points) {
 }
 
 ClipReach clip_reach(const Points& points, float floor) {
-  constexpr float kRoom = 1.3f;
+  constexpr float kRoom = 1.3f, kLargest = 1000;  // metres: beyond, numbers are no figure's
   const Point centre = clip_centre(points);
   std::vector<float> away;
   for (const Point& p : points)
@@ -152,8 +152,10 @@ ClipReach clip_reach(const Points& points, float floor) {
   ClipReach out;
   if (away.empty()) return out;
   const float reach = kRoom * ranked(away, (away.size() - 1) * 98 / 100);
+  const float high = centre.y() - floor + reach;
+  if (!(reach < kLargest && high < kLargest)) return out;
   out.aside = std::max(out.aside, reach);
-  out.high = std::max(out.high, centre.y() - floor + reach);
+  out.high = std::max(out.high, high);
   return out;
 }
 
