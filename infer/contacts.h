@@ -1,4 +1,4 @@
-// Hands that touch what the source's hands touch, and go through nothing.
+// Hands that touch what the source's hands touch, and go no deeper into the body.
 #pragma once
 
 #include "nn/geometry/part_surfaces.h"
@@ -17,8 +17,8 @@ struct BodyInPose {
 /// same part, as far from the surface. That counts fully where the source's hand touches, and not
 /// at all where it is farther away than 0.15 of an arm; then only what would go through a part is
 /// moved out of it. Two hands that are near each other keep their distance and its direction, in
-/// lengths of the arm. A frame is solved for itself and every step of it is smooth, so what is calm
-/// stays calm.
+/// lengths of the arm. What an arm cannot reach it does not reach for. A frame is solved for
+/// itself: who moves hands by it smooths it over the frames, or lets the hands follow.
 ///
 /// Interaction descriptors over places of a surface: Al-Asqhar et al. 2013, "Relationship
 /// descriptors for interactive motion adaptation"; here with one place a part and a closed form.

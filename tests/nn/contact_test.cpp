@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <optional>
+
 #include "infer/foot_lock.h"
 #include "nn/metrics/metrics.h"
 #include "tests/support/tiny_body.h"
@@ -70,6 +72,28 @@ TEST(Contact, LegsReachAndFeetKeepTheirOrientation) {
       }
       EXPECT_GT(after.joints[4 + side].z(), after.joints[7 + side].z()) << "knees bend forward";
     }
+}
+
+/// A wrist goes round the shoulder, past the direction in which the elbow lies.
+TEST(Contact, ElbowsGoRoundWithTheArm) {
+  const Joints rest = tiny_joints();
+  Pose pose;
+  pose.local.fill(Mat3::Identity());
+  pose.root = rest[kPelvis];
+  pose.local[kLeftElbow] = Eigen::AngleAxisd(-1.5, Vec3::UnitY()).toRotationMatrix();
+  const Joints begun = forward_kinematics(rest, pose).joints;
+  const Vec3 arm = begun[kLeftWrist] - begun[kLeftShoulder];
+  std::optional<Vec3> before;
+  for (double angle = 0; angle < 1.8; angle += 0.02) {
+    Pose moved = pose;
+    move_hand(rest, 0, Eigen::AngleAxisd(angle, Vec3::UnitY()) * arm - arm, &moved);
+    const Joints now = forward_kinematics(rest, moved).joints;
+    EXPECT_NEAR((now[kLeftWrist] - begun[kLeftShoulder]).norm(), arm.norm(), 1e-6);
+    if (before) {
+      EXPECT_LT((now[kLeftElbow] - *before).norm(), 0.03 * arm.norm()) << angle;
+    }
+    before = now[kLeftElbow];
+  }
 }
 
 TEST(Contact, FartherThanALegNobodyReaches) {
