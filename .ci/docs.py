@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
-"""Pages for people: every relative link and its anchor lead somewhere, every page that code names is there, and the pages
-are short enough to be read. Prints one line for each fault; exit code 1 if there is any."""
+"""Pages for people: every relative link and its anchor lead somewhere, every page that code names is there, every step of .ci/run
+that a page or a workflow names is one, and docs/decisions.md is short enough to be read. Prints one line for each fault; exit code 1 if
+there is any."""
 import pathlib
 import re
 import subprocess
@@ -8,9 +9,7 @@ import sys
 
 ROOT = pathlib.Path(__file__).resolve().parents[1]
 DECISIONS = ROOT / "docs/decisions.md"
-REFERENCE = ROOT / "docs/config_reference.md"  # a test asks for each of its rows
-# Of README.md and docs without these two pages and what is generated below docs/reproduction; of the first of them.
-MOST_WORDS, MOST_DECISIONS = 24_000, 4_000
+MOST_DECISIONS = 4_000  # words
 faults = []
 
 
@@ -57,21 +56,27 @@ def check_names_in_code():
             faults.append("%s:%s: names %s, which has no such heading" % (file, number, name))
 
 
+def check_steps():
+    """What stands after .ci/run in code spans of pages, and in lists and lines of YAML, is a step."""
+    steps = set(re.findall(r"^  check ([a-z]+) ", (ROOT / ".ci/run").read_text(), re.M)) | {"all"}
+    listed = subprocess.run(["git", "-C", ROOT, "ls-files", "-co", "--exclude-standard", "*.md", "*.yml", "*.yaml"], capture_output=True, text=True, check=True)
+    for name in filter(lambda n: n and (ROOT / n).exists(), listed.stdout.split("\n")):
+        text = (ROOT / name).read_text()
+        named = re.findall(r"`\.ci/run((?: [a-z]+)+)`" if name.endswith(".md") else r"\.ci/run((?: [a-z]+)+) *$", text, re.M)
+        named += [words.replace(",", " ") for words in re.findall(r"^ *step: \[(.*)\]$", text, re.M)]
+        for step in sorted(set(" ".join(named).split()) - steps):
+            faults.append("%s: names '%s', which is no step of .ci/run" % (name, step))
+
+
 for page in pages():
     check_links(page)
 check_names_in_code()
+check_steps()
 
 
-def words(*paths):
-    return sum(len(path.read_text().split()) for path in paths)
-
-
-generated = [p for p in pages() if p.is_relative_to(ROOT / "docs/reproduction")]
-read = [p for p in pages() if p.is_relative_to(ROOT / "docs") and p not in (DECISIONS, REFERENCE, *generated)] + [ROOT / "README.md"]
-print("%d pages to read, %d words; decisions, %d words" % (len(read), words(*read), words(DECISIONS)))
-if words(*read) > MOST_WORDS:
-    faults.append("docs: %d words, and %d are enough; a reason belongs into docs/decisions.md" % (words(*read), MOST_WORDS))
-if words(DECISIONS) > MOST_DECISIONS:
-    faults.append("docs/decisions.md: %d words, and %d are enough; git keeps what goes" % (words(DECISIONS), MOST_DECISIONS))
+words = len(DECISIONS.read_text().split())
+print("%d pages; decisions, %d words" % (len(pages()), words))
+if words > MOST_DECISIONS:
+    faults.append("docs/decisions.md: %d words, and %d are enough; git keeps what goes" % (words, MOST_DECISIONS))
 print("\n".join(faults))
 sys.exit(bool(faults))

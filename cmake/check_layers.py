@@ -41,9 +41,9 @@ MAY_USE = {
     "train/training": ENGINE + NN + ["train", "train/artifacts", "train/stages", "datasets/*"],
     "train/*": ENGINE + NN + ["train", "train/optim", "train/mpi"],
     "experiments/cli": PRODUCT + ["autograd/gradcheck", "experiments/*"],
-    "experiments/reproduce": PRODUCT + ["experiments", "experiments/evaluation", "experiments/pictures", "experiments/sweep"],
-    "experiments/sweep": PRODUCT + ["experiments", "experiments/evaluation", "experiments/observers", "experiments/report"],
-    "experiments/report": PRODUCT + ["experiments", "experiments/evaluation", "experiments/pictures", "experiments/sweep"],
+    "experiments/reproduce": PRODUCT + ["experiments", "experiments/evaluation", "experiments/pictures", "experiments/search", "experiments/sweep"],
+    "experiments/sweep": PRODUCT + ["experiments", "experiments/evaluation", "experiments/observers", "experiments/report", "experiments/search"],
+    "experiments/report": PRODUCT + ["experiments", "experiments/evaluation", "experiments/pictures", "experiments/search", "experiments/sweep"],
     "experiments/*": PRODUCT + ["experiments"],
     "python": PRODUCT + ["autograd/gradcheck", "experiments", "experiments/adapt", "experiments/cli",
                          "experiments/evaluation", "experiments/pictures"],
@@ -63,14 +63,14 @@ ONLY_IN = {
     "yaml-cpp/": ["nn/config/config_yaml.cpp", "nn/weights/", "datasets/importers/rigs/profiles.cpp"],
     "CLI/": ["experiments/cli/command_options.cpp", "experiments/cli/program.cpp"],
     "nanoflann.hpp": ["nn/metrics/", "datasets/doctor/", "infer/registration/"],
-    "nlohmann/": ["nn/weights/", "datasets/readers/", "datasets/benchmark/manifest.cpp", "datasets/characters/",
+    "nlohmann/": ["nn/weights/", "datasets/readers/", "datasets/importers/joints/joint_json.cpp", "datasets/benchmark/manifest.cpp", "datasets/characters/",
                   "datasets/doctor/mended_file.cpp",
                   "datasets/importers/bodies/makehuman_pack.cpp", "datasets/fetch/fetch_cmu.cpp", "train/", "infer/",
                   "experiments/"],
     "mpi.h": ["train/mpi/"],
     "assimp/": ["datasets/readers/fbx/assimp/"],
     "openssl/": ["datasets/readers/sha256.cpp"],
-    "stb/": ["infer/render/"],
+    "stb/": ["infer/render/", "datasets/readers/depth/grey_png.cpp"],
     "webp/": ["infer/render/texture.cpp", "infer/render/webp.cpp"],
     "gif_lib.h": ["infer/render/gif.cpp"],
     "lzma.h": ["datasets/readers/"],
@@ -93,7 +93,8 @@ ONLY_IN = {
     "thread": ["autograd/base/", "experiments/", "train/lease.cpp", "train/artifacts/made_once.cpp",  # waiting
                "train/mpi/",  # rows on their way
                "infer/live/",  # clouds that arrive, a page that is served
-               "train/run_provenance.cpp"],  # counting cores
+               "train/run_provenance.cpp",  # counting cores
+               "python/feed.h"],  # batches that are drawn ahead
     "future": ["train/ahead.h"],  # the next examples, while a GPU computes
 }
 

@@ -161,6 +161,8 @@ struct SourceRecord {
   double scale = 1;                                ///< metres per unit
   std::string up = "y";                            ///< the axis that points up: x, -x, y, -y, z, -z
   bool up_known = false;                           ///< somebody said which axis it is; not stored
+  /// Of several people in clouds this one, from 0 (datasets/doctor/people.h); not stored.
+  std::optional<int64_t> person = std::nullopt;
 };
 
 /// Nothing where the prediction does not say. A relative path is stored relative to the

@@ -5,7 +5,7 @@
     restage weights import --source model.safetensors --model skeleton/point_transformer \
         [--map names.yaml] --out weights.safetensors
 
-restage itself never reads pickles, since reading one may run code that is hidden in it. This script
+restage itself never reads weights from pickles, which may hide code. This script
 uses torch's restricted loader (weights_only), which allows tensors alone. Needs torch and numpy.
 Half precision becomes float32; names are kept; `restage weights show` lists them.
 """

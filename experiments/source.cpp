@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "autograd/base/words.h"
 #include "datasets/readers/errors.h"
 #include "datasets/readers/gltf/gltf.h"
 #include "nn/models/extraction.h"
@@ -26,16 +27,46 @@ Source::Source(const SourceRecord& how, uint64_t max_memory)
       open_frames(how.path, {.clip = how.clip, .max_memory = max_memory, .sequence = how.sequence});
   check_one_sequence(how.path, frames_->sequences(), how.sequence);
   if (!how_.fps) how_.fps = frames_->fps();
+  end_ = frames_->frames();
+  find_person();
 }
 
 Source::Source(const SourceRecord& how, std::unique_ptr<FrameSource> frames)
     : how_(how), to_ours_(how.scale, how.up), frames_(std::move(frames)) {
   check(how);
   if (!how_.fps) how_.fps = frames_->fps();
+  end_ = frames_->frames();
+  find_person();
+}
+
+void Source::find_person() {
+  if (!how_.person) return;
+  int64_t first = -1, last = -1;
+  for (int64_t frame = 0; const auto cloud = read(); ++frame)
+    if (!cloud->fault) first = first < 0 ? frame : first, last = frame;
+  const size_t people = people_.people();
+  rewind();
+  if (first >= 0) {
+    begin_ = first, end_ = last + 1;
+    return;
+  }
+  if (people == 0)
+    throw InputError(how_.path, "shows nobody: no piece of its clouds is half a metre large",
+                     "give the unit with --scale; if a floor or a wall is in the clouds, take it "
+                     "out first with restage doctor --fix");
+  throw InputError(
+      how_.path, cat("shows ", counted(people, "person", "people"), ", no number ", *how_.person),
+      "count them from 0, from -x to +x, then as they come ('restage doctor --people' lists them); "
+      "a floor joins people: restage doctor --fix takes it out");
 }
 
 std::optional<SourceCloud> Source::next() {
-  if (at_ == frames_->frames()) return std::nullopt;
+  while (at_ < begin_) read();
+  return read();
+}
+
+std::optional<SourceCloud> Source::read() {
+  if (at_ == end_) return std::nullopt;
   ++at_;
   SourceCloud out;
   out.fault = broken_;
@@ -54,22 +85,40 @@ std::optional<SourceCloud> Source::next() {
     out.frame.left_out += to_ours_.clean(out.frame.points);
   else
     to_ours_(out.frame.points);
+  if (how_.person && !out.fault) choose_person(out);
   return out;
 }
 
+void Source::choose_person(SourceCloud& cloud) {
+  const auto who = static_cast<size_t>(*how_.person);
+  Frame& frame = cloud.frame;
+  std::vector<Points> people = people_.follow(frame.points);
+  if (who < people.size()) frame.points = std::move(people[who]);
+  frame.faces.clear();
+  if (who >= people.size() || frame.points.size() < kLeastDistinctPoints)
+    cloud.fault =
+        InputError(frame.source, cat("does not show person ", who), "leave the frame out");
+}
+
 void Source::skip(int64_t frames) {
-  for (; frames > 0 && at_ < frames_->frames(); --frames, ++at_)
+  if (how_.person)  // nobody is followed through frames that nobody looks at
+    for (; frames > 0 && at_ < end_; --frames) next();
+  for (; frames > 0 && at_ < end_; --frames, ++at_)
     if (!broken_) frames_->skip();
 }
 
 void Source::rewind() {
   at_ = 0;
+  people_.restart();
   broken_.reset();
   frames_->rewind();
 }
 
 std::vector<std::string> Source::remarks() const {
   std::vector<std::string> out = frames_->remarks();
+  if (frames() < frames_->frames())
+    out.push_back(cat("person ", *how_.person, " is in sight in frames ", begin_, " to ", end_ - 1,
+                      " of ", frames_->frames(), ": these are taken"));
   const std::vector<int64_t> numbers = frames_->numbers();
   if (numbers.size() < 2) return out;
   int64_t step = INT64_MAX, missing = 0;

@@ -6,6 +6,7 @@
 
 #include "autograd/base/error.h"
 #include "datasets/doctor/cloud_door.h"
+#include "datasets/doctor/people.h"
 #include "datasets/readers/frames/frame_folder.h"
 #include "datasets/schema.h"
 
@@ -25,14 +26,16 @@ class Source {
   /// Of frames that somebody has at hand; `how.path` is what they are called.
   Source(const SourceRecord& how, std::unique_ptr<FrameSource> frames);
 
-  /// The next frame; nothing at the end. A frame that is damaged, or empty, does not end the
-  /// sequence: it comes with its fault. Points that are not finite, or far from
-  /// all others (nn/geometry/strays.h), are left out (Frame::left_out).
+  /// The next frame; nothing at the end. Of several people the one that `how.person` names, from
+  /// the first frame that shows the person to the last; frames between them without the person have
+  /// a fault. A frame that is damaged, or empty, does not end the sequence: it comes with its
+  /// fault. Points that are not finite, or far from all others (nn/geometry/strays.h), are left out
+  /// (Frame::left_out).
   std::optional<SourceCloud> next();
   void skip(int64_t frames);
   void rewind();
 
-  int64_t frames() const { return frames_->frames(); }
+  int64_t frames() const { return end_ - begin_; }
   double fps() const { return *how_.fps; }
   /// What the user should know of the whole, such as files that were left out.
   std::vector<std::string> remarks() const;
@@ -41,11 +44,18 @@ class Source {
 
  private:
   void return_to_place();
+  /// Which frames show the person who is asked for. InputError: none does.
+  void find_person();
+  std::optional<SourceCloud> read();
+  /// Leaves the points of the person who is asked for, and whole clouds without.
+  void choose_person(SourceCloud& cloud);
 
   SourceRecord how_;
   ToOurs to_ours_;
   std::unique_ptr<FrameSource> frames_;
-  int64_t at_ = 0;                    // frames given or skipped
+  PeopleTracker people_;              // where one of several is asked for
+  int64_t at_ = 0;                    // frames given or skipped, of the whole file
+  int64_t begin_ = 0, end_ = 0;       // frames that are given
   std::optional<InputError> broken_;  // nothing behind this place can be read
 };
 

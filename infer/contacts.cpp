@@ -118,25 +118,37 @@ class Solve {
   /// What a short arm cannot reach is not reached for: the arm would go through the body. Nor is an
   /// arm folded as none can be.
   double within_reach(int side, const Vec3& by) const {
-    constexpr double kReach = 1, kBeyond = 1.25, kFolded = 0.4;  // of the arm
+    constexpr double kReach = 1, kBeyond = 1.25;  // of the arm
     const auto at = [&](int joint) {
       return target_.posed.joints[static_cast<size_t>(joint + side)];
     };
     const double arm = std::max(scale_ * arm_, 1e-9);
     const double now = (at(kLeftWrist) - at(kLeftShoulder)).norm() / arm,
                  far = (at(kLeftWrist) + by - at(kLeftShoulder)).norm() / arm;
-    const double least = std::min(now, kFolded);
+    const double least = std::min(now, folded(side, 0.4));
     return falling(far, kReach, kBeyond) * (1 - falling(far, 0.5 * least, least));
+  }
+  /// The least distance of a wrist from its shoulder, in lengths of the arm: the usual one, or more
+  /// where upper arm and forearm differ much. A wrist at their difference leaves its elbow one
+  /// place only, through which it would jump.
+  double folded(int side, double usual) const {
+    constexpr double kAbove = 0.12;
+    const auto bone = [&](int a, int b) {
+      return (target_.posed.joints[static_cast<size_t>(a + side)] -
+              target_.posed.joints[static_cast<size_t>(b + side)])
+          .norm();
+    };
+    const double upper = bone(kLeftShoulder, kLeftElbow), lower = bone(kLeftElbow, kLeftWrist);
+    return std::max(usual, std::abs(upper - lower) / std::max(scale_ * arm_, 1e-9) + kAbove);
   }
   /// The same of what moves a hand out of parts.
   void keep_unfolded(int side) {
-    constexpr double kFolded = 0.3;
     const auto at = [&](int joint) {
       return target_.posed.joints[static_cast<size_t>(joint + side)];
     };
     Vec3& by = moved_[static_cast<size_t>(side)];
     const Vec3 now = at(kLeftWrist) - at(kLeftShoulder);
-    const double least = std::min(now.norm(), kFolded * scale_ * arm_);
+    const double least = std::min(now.norm(), folded(side, 0.3) * scale_ * arm_);
     const Vec3 then = now + by;
     if (then.norm() >= least) return;
     const Vec3 out = (then + 0.2 * now).normalized();
@@ -215,11 +227,38 @@ std::array<Vec3, 2> Contacts::moves(const BodyInPose& source, const Joints& rest
   return Solve(source, target, sure)();
 }
 
+namespace {
+
+constexpr double kNothingMoves = 1e-5;  // metres
+
+std::array<Vec3, 2> elbows_of(const Joints& rest, const Pose& pose) {
+  const Joints joints = forward_kinematics(rest, pose).joints;
+  return {joints[kLeftElbow], joints[kRightElbow]};
+}
+
+}  // namespace
+
 void move_hands(const Joints& rest, const std::array<Vec3, 2>& by, Pose* pose) {
-  constexpr double kNothing = 1e-5;  // metres
   for (const int side : {0, 1})
-    if (const Vec3& offset = by[static_cast<size_t>(side)]; offset.norm() > kNothing)
+    if (const Vec3& offset = by[static_cast<size_t>(side)]; offset.norm() > kNothingMoves)
       move_hand(rest, side, offset, pose);
+}
+
+std::array<Vec3, 2> elbows_moved(const Joints& rest, const std::array<Vec3, 2>& by,
+                                 const Pose& pose) {
+  Pose moved = pose;
+  move_hands(rest, by, &moved);
+  const std::array<Vec3, 2> before = elbows_of(rest, pose), after = elbows_of(rest, moved);
+  return {after[0] - before[0], after[1] - before[1]};
+}
+
+void move_hands(const Joints& rest, const std::array<Vec3, 2>& by,
+                const std::array<Vec3, 2>& elbows, Pose* pose) {
+  const std::array<Vec3, 2> before = elbows_of(rest, *pose);
+  move_hands(rest, by, pose);
+  for (size_t side = 0; side < 2; ++side)
+    if (elbows[side].norm() > kNothingMoves)
+      turn_elbow(rest, static_cast<int>(side), before[side] + elbows[side], pose);
 }
 
 }  // namespace restage

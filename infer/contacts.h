@@ -38,4 +38,13 @@ class Contacts {
 /// Moves both hands as far as the arms reach.
 void move_hands(const Joints& rest, const std::array<Vec3, 2>& by, Pose* pose);
 
+/// By how much move_hands() moves the left and the right elbow, metres. A wrist that is moved far
+/// can go smoothly while its elbow jumps to the other side of the arm.
+std::array<Vec3, 2> elbows_moved(const Joints& rest, const std::array<Vec3, 2>& by,
+                                 const Pose& pose);
+/// The same as move_hands(), with elbows as near as they come to where `elbows` moves them: of
+/// elbows_moved(), smoothed over the frames.
+void move_hands(const Joints& rest, const std::array<Vec3, 2>& by,
+                const std::array<Vec3, 2>& elbows, Pose* pose);
+
 }  // namespace restage

@@ -28,22 +28,46 @@ FlatFoot flat_foot(const Joints& rest) {
   return {0.5 * (rest[7].y() + rest[8].y()), 0.5 * (rest[10].y() + rest[11].y())};
 }
 
-std::array<double, 2> sole_heights(const Joints& a, const FlatFoot& flat, double scale) {
-  const double leg = leg_length(a);
+namespace {
+
+/// How high A's feet are over where they stand flat.
+std::array<double, 2> clear_of_floor(const Joints& a, const FlatFoot& flat) {
   std::array<double, 2> out;
-  for (size_t side = 0; side < 2; ++side) {
-    const double clear =
+  for (size_t side = 0; side < 2; ++side)
+    out[side] =
         std::min(a[7 + side].y() - flat.ankle, a[static_cast<size_t>(kFeet[side])].y() - flat.ball);
-    const double t = std::clamp(
-        (std::abs(clear) / std::max(leg, 1e-6) - kOnFloor) / (kElsewhere - kOnFloor), 0.0, 1.0);
-    out[side] = t * t * (3 - 2 * t) * scale * clear;
-  }
+  return out;
+}
+
+/// 0 for a foot on the floor, 1 for one elsewhere. `clear`: metres over or under the floor.
+double elsewhere(double clear, double leg) {
+  const double t = std::clamp(
+      (std::abs(clear) / std::max(leg, 1e-6) - kOnFloor) / (kElsewhere - kOnFloor), 0.0, 1.0);
+  return t * t * (3 - 2 * t);
+}
+
+}  // namespace
+
+std::array<double, 2> sole_heights(const Joints& a, const FlatFoot& flat, double scale) {
+  std::array<double, 2> out = clear_of_floor(a, flat);
+  for (double& clear : out) clear = elsewhere(clear, leg_length(a)) * scale * clear;
   return out;
 }
 
 std::array<double, 2> least_heights(const Joints& a, const FlatFoot& flat, double scale) {
   std::array<double, 2> out = sole_heights(a, flat, scale);
   for (double& height : out) height = std::min(height, 0.0);
+  return out;
+}
+
+std::array<double, 2> floating(const Joints& a, const FlatFoot& flat, double scale,
+                               const Soles& soles, const Joints& rest, const Pose& pose) {
+  std::array<double, 2> out = soles.lowest(forward_kinematics(rest, pose));
+  const std::array<double, 2> clear = clear_of_floor(a, flat);
+  for (size_t side = 0; side < 2; ++side) {
+    const double meant = scale * std::max(clear[side], 0.0);
+    out[side] = (1 - elsewhere(clear[side], leg_length(a))) * std::max(0.0, out[side] - meant);
+  }
   return out;
 }
 
@@ -71,11 +95,14 @@ std::array<double, 2> Footing::operator()(const Joints& rest, const Joints& a, d
   return above;
 }
 
-void Footing::keep_above(const Joints& rest, const Joints& a, double scale, Pose* pose) {
+void Footing::settle_feet(const Joints& rest, const Joints& a, double scale, Pose* pose) {
   const std::array<double, 2> deep =
       depths(least_heights(a, bare_foot(a), scale), soles_, rest, *pose);
-  for (size_t side = 0; side < 2; ++side)
-    lifts_[side] = std::max(deep[side], kLetDown * lifts_[side]);
+  const std::array<double, 2> high = floating(a, bare_foot(a), scale, soles_, rest, *pose);
+  for (size_t side = 0; side < 2; ++side) {
+    const double wanted = deep[side] > 0 ? deep[side] : -high[side];
+    lifts_[side] = std::max(wanted, lifts_[side] + (1 - kLetDown) * (wanted - lifts_[side]));
+  }
   raise_feet(lifts_, rest, pose);
 }
 

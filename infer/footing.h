@@ -25,6 +25,12 @@ std::array<double, 2> sole_heights(const Joints& a, const FlatFoot& flat, double
 /// go down).
 std::array<double, 2> least_heights(const Joints& a, const FlatFoot& flat, double scale);
 
+/// How far each sole is above where A's foot says while that foot is near the floor, metres; fades
+/// as A's foot goes up, and is 0 for a sole that is not above. Legs of another build put a foot
+/// that steps beside the body high above the floor.
+std::array<double, 2> floating(const Joints& a, const FlatFoot& flat, double scale,
+                               const Soles& soles, const Joints& rest, const Pose& pose);
+
 /// Works frame by frame at kFps and looks at no later frame. Figures differ in more than size: a
 /// boot lifts an ankle, and legs that are seen a little too short put a pelvis too low. So the
 /// whole figure is raised or lowered until the sole of the foot that stands is where A's foot says
@@ -39,16 +45,16 @@ class Footing {
   /// sole is still above where it belongs, metres (FootLock).
   std::array<double, 2> operator()(const Joints& rest, const Joints& a, double scale,
                                    const std::array<double, 2>& standing, Pose* pose);
-  /// Feet that are under the floor are raised at once, and let down again within some frames; to be
-  /// called when the feet are where they stay.
-  void keep_above(const Joints& rest, const Joints& a, double scale, Pose* pose);
+  /// Feet that are under the floor are raised at once, and let down again within some frames. Those
+  /// that float (floating()) are let down, too. To be called when the feet are where they stay.
+  void settle_feet(const Joints& rest, const Joints& a, double scale, Pose* pose);
   /// The next frame is the first of another sequence.
   void forget() { raised_.reset(), lifts_ = {}; }
 
  private:
   Soles soles_;
   std::optional<double> raised_;      ///< metres
-  std::array<double, 2> lifts_ = {};  ///< of the feet, in the frame before
+  std::array<double, 2> lifts_ = {};  ///< of the feet, in the frame before; below 0: drops
 };
 
 }  // namespace restage

@@ -380,7 +380,7 @@ void Retargeter::stand(const float* logits, const Joints& a, Pose* pose) {
   std::optional<std::array<double, 2>> above;
   if (footing_) above = (*footing_)(rest_, a, scale, standing, pose);
   if (options_.foot_lock) feet_(rest_, standing, pose, above);
-  if (footing_) footing_->keep_above(rest_, a, scale, pose);
+  if (footing_) footing_->settle_feet(rest_, a, scale, pose);
 }
 
 /// Moves B's pelvis on by `velocity`, metres a second, and draws it to A's scaled path

@@ -5,6 +5,7 @@
 
 #include "autograd/base/error.h"
 #include "autograd/base/words.h"
+#include "python/dlpack.h"
 
 namespace restage::python {
 
@@ -18,6 +19,61 @@ void refuse_mask(const py::handle& value, const std::string& what) {
                      "leave the masked rows out: numpy.ma.compress_rows(a)");
 }
 
+namespace {
+
+/// The first line of what Python raised; what is no Exception, such as Ctrl-C, goes on.
+std::string reason_of(const py::error_already_set& error) {
+  if (!error.matches(PyExc_Exception)) throw error;
+  const std::string text = py::str(error.value());
+  return text.substr(0, text.find('\n'));
+}
+
+/// The memory of what is ours.
+std::optional<py::array> own_array(const py::handle& value) {
+  if (py::isinstance<Tensor>(value)) return array_of(value.cast<const Tensor&>());
+  if (py::isinstance<Parameter>(value)) return array_of(value.cast<PyParameter>()->value);
+  if (py::isinstance<PyVar>(value)) return array_of(value.cast<const PyVar&>().var.value);
+  return {};
+}
+
+}  // namespace
+
+bool lends_memory(const py::handle& value) {
+  return offers_dlpack(value) || PyObject_CheckBuffer(value.ptr()) != 0;
+}
+
+py::array array_like(const py::handle& value, const std::string& what) {
+  if (py::isinstance<py::array>(value)) return py::reinterpret_borrow<py::array>(value);
+  if (auto own = own_array(value)) return *std::move(own);
+  std::string why;
+  if (offers_dlpack(value)) {
+    try {
+      return array_by_dlpack(value, what);
+    } catch (const py::error_already_set& error) {  // its __array__ may know more
+      why = reason_of(error);
+    } catch (const py::buffer_error& error) {
+      why = error.what();
+    }
+  }
+  try {
+    const py::object out = py::module_::import("numpy").attr("asarray")(value);
+    const bool other = why.empty() || out.attr("dtype").attr("kind").cast<std::string>() != "O";
+    if (other) return py::reinterpret_borrow<py::array>(out);
+  } catch (const py::error_already_set& error) {
+    const std::string text = reason_of(error);
+    if (why.empty()) why = text;
+  }
+  throw InputError(what, "is no array: " + why, "give an array of numbers");
+}
+
+py::object array_or_same(const py::object& value, const std::string& what) {
+  const bool known = py::isinstance<py::array>(value) || py::isinstance<py::list>(value) ||
+                     py::isinstance<py::tuple>(value);
+  if (known || !(lends_memory(value) || PyObject_HasAttrString(value.ptr(), "__array__") != 0))
+    return value;
+  return array_like(value, what);
+}
+
 template <class T>
 py::array_t<T, py::array::c_style> numbers(const py::handle& value, const std::string& what) {
   const auto refuse = [&](const std::string& wrong) {
@@ -25,8 +81,7 @@ py::array_t<T, py::array::c_style> numbers(const py::handle& value, const std::s
   };
   if (!value || value.is_none() || py::isinstance<py::str>(value)) refuse("is no array");
   refuse_mask(value, what);
-  const py::array any = py::array::ensure(value);
-  if (!any) PyErr_Clear(), refuse("is no array");
+  const py::array any = array_like(value, what);
   const char kind = any.dtype().kind();
   if (kind != 'f' && kind != 'i' && kind != 'u')
     refuse("holds " + std::string(py::str(any.dtype())) + ", no real numbers");

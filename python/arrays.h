@@ -13,6 +13,14 @@
 
 namespace restage::python {
 
+/// Whatever holds numbers as an array, without a copy where its memory can be read in place:
+/// arrays, DLPack (PyTorch's tensors), __array__, the buffer protocol, lists. InputError naming
+/// `what` for anything else, and for memory that is not the CPU's.
+py::array array_like(const py::handle& value, const std::string& what);
+/// The same for a value that offers its memory (no list, no iterator); any other as it is.
+py::object array_or_same(const py::object& value, const std::string& what);
+/// Whether a value offers its memory by DLPack, or by the buffer protocol.
+bool lends_memory(const py::handle& value);
 /// An array of real numbers, C-contiguous, of type T. InputError naming `what` for anything else.
 template <class T>
 py::array_t<T, py::array::c_style> numbers(const py::handle& value, const std::string& what);

@@ -45,9 +45,13 @@ void add_tape(py::module_& m);
 void add_ops(py::module_& m);
 void add_own_op(py::module_& m);
 void add_gradcheck(py::module_& m);
+void add_context(py::module_& m);
 void add_model(py::module_& m);
+void add_own_network(py::module_& m);
+void add_data(py::module_& m);
 void add_optim(py::module_& m);
 void add_train(py::module_& m);
+void add_main(py::module_& m);
 
 // ---- calls into the program (command.cpp) -------------------------------------------------------
 

@@ -4,6 +4,7 @@
 #include <pybind11/numpy.h>
 
 #include <array>
+#include <map>
 #include <memory>
 #include <mutex>
 
@@ -17,10 +18,18 @@ namespace restage::python {
 /// an op of Python takes the GIL while it holds this.
 std::recursive_mutex& recording();
 
+/// Whether ops of this thread are computed and not recorded (restage.no_grad).
+bool& unrecorded();
+
+/// A parameter, with the module that it belongs to.
+using PyParameter = std::shared_ptr<Parameter>;
+
 /// A tape that lives as long as a value on it does, so that no value of Python's can lose its tape.
 struct PyTape {
   using Bound = void;
   Tape tape;
+  /// Its leaves since the last backward, by identity; null: no parameter.
+  std::map<uint64_t, PyParameter> leaves = {};
 };
 
 struct PyVar {
@@ -30,15 +39,21 @@ struct PyVar {
   uint64_t leaf = 0;             ///< its identity, if it is a leaf
 };
 
+/// The value as an op sees it: a constant while nothing is recorded.
+inline PyVar as_seen(const PyVar& v) {
+  return unrecorded() ? PyVar{v.var.detach(), nullptr, 0} : v;
+}
+
 struct PyGradients {
   using Bound = void;
   Gradients gradients;
+  std::map<uint64_t, PyParameter> leaves = {};  ///< those that took part; null: no parameter
   /// Of a leaf or a parameter; null if the loss does not depend on it.
   const Tensor* find(const py::handle& of) const;
 };
 
-/// A parameter, with the module that it belongs to.
-using PyParameter = std::shared_ptr<Parameter>;
+/// With those of the leaves that took part.
+PyGradients gradients_of(Gradients gradients, std::map<uint64_t, PyParameter> leaves);
 
 DType dtype_of(const std::string& name);
 Shape shape_of(const py::handle& value);
@@ -63,7 +78,8 @@ PyVar run_op(const Inputs& inputs, const Work& work) {
   const py::gil_scoped_release released;
   std::unique_lock<std::recursive_mutex> lock(recording(), std::defer_lock);
   bool on_tape = false;
-  for (const PyVar* v : inputs) on_tape = on_tape || v->var.on_tape();
+  // A tape of C++ is recorded by the thread that made it, and needs no lock.
+  for (const PyVar* v : inputs) on_tape = on_tape || (v->tape && v->var.on_tape());
   if (on_tape) lock.lock();
   out.var = work();
   if (!out.var.on_tape()) out.tape = nullptr;

@@ -5,7 +5,7 @@
 #include "autograd/base/error.h"
 #include "autograd/base/interrupt.h"
 #include "experiments/text.h"
-#include "python/bind.h"
+#include "python/own_network.h"
 
 namespace restage::python {
 namespace {
@@ -61,9 +61,50 @@ void translate(std::exception_ptr thrown) {
   }
 }
 
+/// " (mine.py, line 12)": the innermost place that is no file of ours. "" where there is none: a
+/// call with other arguments than the function takes has no traceback.
+std::string place_of(const py::error_already_set& error) {
+  if (!error.trace()) return "";
+  const py::list folders = py::module_::import("restage").attr("__path__");
+  const std::string ours = std::string(py::str(folders[0])) + "/";
+  const auto frames = py::module_::import("traceback").attr("extract_tb")(error.trace());
+  std::string place;
+  for (const py::handle frame : frames) {
+    const std::string file = py::str(frame.attr("filename"));
+    if (!file.starts_with(ours) && !file.starts_with("<"))
+      place = file + ", line " + std::string(py::str(frame.attr("lineno")));
+  }
+  return place.empty() ? "" : " (" + place + ")";
+}
+
+/// "ValueError: no such thing (mine.py, line 12)"
+std::string line_of(const py::error_already_set& error) {
+  return std::string(py::str(error.type().attr("__name__"))) + ": " +
+         std::string(py::str(error.value())) + place_of(error);
+}
+
+bool is_the_program = false;
+
 py::object of(PyObject* type) { return py::reinterpret_borrow<py::object>(type); }
 
 }  // namespace
+
+void be_the_program() { is_the_program = true; }
+
+void fail(const py::error_already_set& error, const std::string& where) {
+  const std::string said = std::string(py::str(error.value()));
+  const std::string mark = "restage: ";
+  const std::string ours = said.starts_with(mark) ? said.substr(mark.size()) : said;
+  if (error.matches(of(non_finite_error))) throw NonFiniteError(ours);
+  if (!is_the_program) throw;  // NOLINT: called where it was caught
+  const bool shape = error.matches(of(shape_error_type));
+  if (!shape && error.matches(of(input_error))) throw InputError::of_line(ours);
+  const std::string line = where + " failed: " + (shape ? ours + place_of(error) : line_of(error));
+  if (error.trace())
+    py::module_::import("traceback")
+        .attr("print_exception")(error.type(), error.value(), error.trace());
+  throw Error(line, 1);
+}
 
 void add_errors(py::module_& m) {
   input_error = new_type(m, "InputError",

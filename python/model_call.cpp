@@ -27,7 +27,9 @@ void check(const PyVar& v, const char* what, std::initializer_list<int64_t> size
 struct Call {
   std::vector<PyVar> in;
   std::shared_ptr<PyTape> tape;
-  Context ctx;
+  Context own;
+  Context* at = &own;
+  Context& ctx() { return *at; }
 
   void count(size_t n, const char* takes) const {
     if (in.size() != n)
@@ -51,7 +53,7 @@ py::object skeleton(SkeletonModel& net, Call& call) {
   call.count(1, "a cloud");
   check(call.in[0], "cloud", {-1, net.points(), 3});
   const SkeletonOutput y =
-      call.run([&] { return net.forward(call.ctx, SkeletonInput(call.in[0].var)); });
+      call.run([&] { return net.forward(call.ctx(), SkeletonInput(call.in[0].var)); });
   py::dict out;
   out["joints"] = call.out(y.joints);
   out["turns"] = call.out(y.turns);
@@ -71,7 +73,7 @@ py::object motion(const MotionModel& net, Call& call) {
     in.trans = call.in[1].var;
     in.rest = call.in[2].var;
     MotionState state;
-    return net.forward(call.ctx, in, &state);
+    return net.forward(call.ctx(), in, &state);
   });
   py::dict out;
   out["rotations"] = call.out(y.rotations);
@@ -87,7 +89,7 @@ py::object transfer(TransferModel& net, Call& call) {
   const int64_t v = net.equal_counts() ? call.in[0].var.size(2) : -1;
   check(call.in[1], "identity", {n, v, 3});
   return call.out(call.run([&] {
-    return net.forward(call.ctx, TransferInput{call.in[0].var, call.in[1].var});
+    return net.forward(call.ctx(), TransferInput{call.in[0].var, call.in[1].var});
   }));
 }
 
@@ -95,33 +97,44 @@ py::object deformation(const DeformationModel& net, Call& call) {
   call.count(2, "rest joints and points");
   check(call.in[0], "rest joints", {-1, kJoints, 3});
   check(call.in[1], "points", {call.in[0].var.size(0), -1, 3});
-  return call.out(call.run([&] { return net.weights(call.ctx, call.in[0].var, call.in[1].var); }));
+  return call.out(
+      call.run([&] { return net.weights(call.ctx(), call.in[0].var, call.in[1].var); }));
 }
 
 py::object perceptron(const Mlp3& net, Call& call) {
   call.count(1, "x");
   if (call.in[0].var.rank() < 1) throw ShapeError("x has no axis");
-  return call.out(call.run([&] { return net(call.ctx, call.in[0].var); }));
+  return call.out(call.run([&] { return net(call.ctx(), call.in[0].var); }));
 }
 
 }  // namespace
 
 py::object call_model(const PyModel& model, const py::args& inputs,
-                      const std::shared_ptr<PyTape>& tape, bool training, uint64_t seed,
-                      uint64_t step) {
+                      const std::shared_ptr<PyTape>& tape, const std::shared_ptr<PyContext>& ctx,
+                      bool training, uint64_t seed, uint64_t step) {
   Call call;
+  if (ctx && (tape || training || seed != 0 || step != 0))
+    throw ShapeError("a ctx says where to record and whether to train; leave the others out");
   const DType type = DType::f32;
   for (const py::handle one : inputs) call.in.push_back(var_of(one, &type));
-  call.tape = tape;
+  const std::shared_ptr<PyTape>& given = ctx ? ctx->tape() : tape;
+  call.tape = unrecorded() ? nullptr : given;
   for (const PyVar& v : call.in) {
     if (!v.tape) continue;
     if (call.tape && call.tape != v.tape)
       throw ShapeError("the network was given values of two tapes");
     call.tape = v.tape;
   }
-  call.ctx.tape = tape ? &tape->tape : nullptr;
-  call.ctx.training = training;
-  call.ctx.rng = RngKey{seed, 0}.fold("python").fold(step);
+  if (given && !unrecorded()) {
+    call.own.tape = &given->tape;
+    const auto parameters = model.parameters();
+    call.run([&] {
+      for (const auto& [name, p] : parameters) given->leaves.emplace(p->id, p);
+    });
+  }
+  if (ctx && !unrecorded()) call.at = &ctx->live();
+  call.own.training = training;
+  call.own.rng = RngKey{seed, 0}.fold("python").fold(step);
   Module* net = model.net.get();
   if (auto* skeletons = dynamic_cast<SkeletonModel*>(net)) return skeleton(*skeletons, call);
   if (auto* motions = dynamic_cast<MotionModel*>(net)) return motion(*motions, call);

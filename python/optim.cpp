@@ -1,9 +1,17 @@
-// restage.Adam and restage.Muon.
+// restage.Adam and its like, restage.Schedule and restage.Average.
+#include <algorithm>
 #include <cmath>
+#include <memory>
 
+#include "autograd/base/words.h"
+#include "python/copies.h"
 #include "python/model.h"
 #include "train/optim/adam.h"
+#include "train/optim/lion.h"
 #include "train/optim/muon.h"
+#include "train/optim/sgd.h"
+#include "train/schedule.h"
+#include "train/selection.h"
 
 namespace restage::python {
 namespace {
@@ -36,34 +44,45 @@ std::vector<std::pair<std::string, PyParameter>> named(const py::object& paramet
   return out;
 }
 
-/// Adam for all parameters, or Muon for matrices and Adam for the rest.
+void is_decay(const char* name, double value) { in_range(name, value, value >= 0 && value < 1); }
+void is_size(const char* name, double value) {
+  in_range(name, value, value >= 0 && std::isfinite(value));
+}
+void is_above_zero(const char* name, double value) {
+  in_range(name, value, value > 0 && std::isfinite(value));
+}
+
+AdamConfig checked(const AdamConfig& c) {
+  is_decay("beta1", c.beta1);
+  is_decay("beta2", c.beta2);
+  is_above_zero("eps", c.eps);
+  is_size("weight_decay", c.weight_decay);
+  return c;
+}
+
+/// One rule for all parameters, or two that share them.
 class PyOptimiser {
  public:
-  PyOptimiser(const py::object& parameters, double rate, const AdamConfig& adam,
-              const std::optional<MuonConfig>& muon)
-      : kept_(named(parameters)), rate_(rate) {
+  PyOptimiser(const py::object& parameters, double rate) : kept_(named(parameters)), rate_(rate) {
     check_rate(rate);
-    in_range("beta1", adam.beta1, adam.beta1 >= 0 && adam.beta1 < 1);
-    in_range("beta2", adam.beta2, adam.beta2 >= 0 && adam.beta2 < 1);
-    in_range("eps", adam.eps, adam.eps > 0 && std::isfinite(adam.eps));
-    in_range("weight_decay", adam.weight_decay,
-             adam.weight_decay >= 0 && std::isfinite(adam.weight_decay));
-    if (muon) in_range("momentum", muon->momentum, muon->momentum >= 0 && muon->momentum < 1);
-    if (muon) in_range("step", muon->step, muon->step > 0 && std::isfinite(muon->step));
-    std::vector<NamedParameter> matrices, rest;
-    for (const auto& [name, p] : kept_)
-      (muon && Muon::takes(*p) ? matrices : rest).push_back({name, p.get()});
-    if (muon) muon_.emplace(matrices, *muon);
-    adam_.emplace(rest, adam);
+    for (const auto& [name, p] : kept_) ids_.push_back(p->id);
+    std::sort(ids_.begin(), ids_.end());
   }
 
-  void step(const Gradients& gradients, const std::optional<double>& rate, double scale) {
+  void step(const Gradients& gradients, const std::optional<double>& rate, double scale,
+            const std::optional<double>& clip, const std::optional<double>& clip_value) {
     if (rate) check_rate(*rate);
     in_range("scale", scale, std::isfinite(scale));
+    if (clip) is_above_zero("clip", *clip);
+    if (clip_value) is_above_zero("clip_value", *clip_value);
     const py::gil_scoped_release released;
     const std::lock_guard<std::recursive_mutex> lock(recording());
-    if (muon_) muon_->step(gradients, rate.value_or(rate_), scale);
-    adam_->step(gradients, rate.value_or(rate_), scale);
+    std::optional<Gradients> small;
+    if (clip_value)
+      small = clipped(gradients, ids_, *clip_value / std::max(1e-300, std::abs(scale)));
+    const Gradients& g = small ? *small : gradients;
+    if (clip) scale *= std::min(1.0, *clip / (std::abs(scale) * g.norm(ids_) + 1e-6));
+    for (const auto& [prefix, rule] : rules_) rule->step(g, rate.value_or(rate_), scale);
   }
   py::dict state() const {
     py::dict out;
@@ -74,8 +93,7 @@ class PyOptimiser {
     TensorFile file;
     file.tensors = tensors_of(state);
     check(file);  // all of it first: nothing is half loaded
-    if (muon_) muon_->load("muon.", file, "state");
-    adam_->load(prefix(), file, "state");
+    for (const auto& [prefix, rule] : rules_) rule->load(prefix, file, "state");
   }
 
   double rate() const { return rate_; }
@@ -84,12 +102,29 @@ class PyOptimiser {
     rate_ = rate;
   }
 
+ protected:
+  /// The parameters for which `takes` is true.
+  template <class Takes>
+  std::vector<NamedParameter> those(Takes&& takes) const {
+    std::vector<NamedParameter> out;
+    for (const auto& [name, p] : kept_)
+      if (takes(*p)) out.push_back({name, p.get()});
+    return out;
+  }
+  std::vector<NamedParameter> all() const {
+    return those([](const Parameter&) { return true; });
+  }
+  template <class Rule, class... Settings>
+  void add(const std::string& prefix, const std::vector<NamedParameter>& parameters,
+           const Settings&... settings) {
+    rules_.emplace_back(prefix, std::make_unique<Rule>(parameters, settings...));
+  }
+
  private:
-  static void check_rate(double rate) { in_range("rate", rate, rate >= 0 && std::isfinite(rate)); }
+  static void check_rate(double rate) { is_size("rate", rate); }
   TensorFile own() const {
     TensorFile file;
-    if (muon_) muon_->save("muon.", file);
-    adam_->save(prefix(), file);
+    for (const auto& [prefix, rule] : rules_) rule->save(prefix, file);
     return file;
   }
   /// InputError unless the state has the names, shapes and dtypes of this optimiser's, and numbers.
@@ -110,27 +145,131 @@ class PyOptimiser {
           refuse("'" + name + "' holds no number that it can hold");
     }
   }
-  const char* prefix() const { return muon_ ? "adam." : ""; }
 
   std::vector<std::pair<std::string, PyParameter>> kept_;
+  std::vector<uint64_t> ids_;  // ascending
   double rate_;
-  std::optional<Muon> muon_;
-  std::optional<Adam> adam_;
+  std::vector<std::pair<std::string, std::unique_ptr<UpdateRule>>> rules_;
 };
 
 struct PyAdam : PyOptimiser {
   using Bound = void;
   PyAdam(const py::object& parameters, double rate, double beta1, double beta2, double eps,
          double weight_decay)
-      : PyOptimiser(parameters, rate, {beta1, beta2, eps, weight_decay}, {}) {}
+      : PyOptimiser(parameters, rate) {
+    add<Adam>("", all(), checked({beta1, beta2, eps, weight_decay}));
+  }
+};
+
+struct PyAdamW : PyOptimiser {
+  using Bound = void;
+  PyAdamW(const py::object& parameters, double rate, double beta1, double beta2, double eps,
+          double weight_decay)
+      : PyOptimiser(parameters, rate) {
+    add<Adam>("", all(), checked({beta1, beta2, eps, weight_decay}), Adam::Decay::of_weights);
+  }
+};
+
+struct PySgd : PyOptimiser {
+  using Bound = void;
+  PySgd(const py::object& parameters, double rate, double momentum, bool nesterov,
+        double weight_decay)
+      : PyOptimiser(parameters, rate) {
+    is_decay("momentum", momentum);
+    is_size("weight_decay", weight_decay);
+    if (nesterov && momentum == 0)
+      throw InputError("", "nesterov needs a momentum above 0",
+                       "give momentum=0.9, or leave it out");
+    SgdConfig config;
+    config.momentum = momentum;
+    config.nesterov = nesterov;
+    config.weight_decay = weight_decay;
+    add<Sgd>("", all(), config);
+  }
+};
+
+struct PyLion : PyOptimiser {
+  using Bound = void;
+  PyLion(const py::object& parameters, double rate, double beta1, double beta2, double weight_decay)
+      : PyOptimiser(parameters, rate) {
+    is_decay("beta1", beta1);
+    is_decay("beta2", beta2);
+    is_size("weight_decay", weight_decay);
+    add<Lion>("", all(), LionConfig{beta1, beta2, weight_decay});
+  }
 };
 
 struct PyMuon : PyOptimiser {
   using Bound = void;
   PyMuon(const py::object& parameters, double rate, double momentum, double step, double beta1,
          double beta2, double eps, double weight_decay)
-      : PyOptimiser(parameters, rate, {beta1, beta2, eps, weight_decay},
-                    MuonConfig{momentum, step}) {}
+      : PyOptimiser(parameters, rate) {
+    is_decay("momentum", momentum);
+    is_above_zero("step", step);
+    const AdamConfig rest = checked({beta1, beta2, eps, weight_decay});
+    add<Muon>("muon.", those([](const Parameter& p) { return Muon::takes(p); }),
+              MuonConfig{momentum, step});
+    add<Adam>("adam.", those([](const Parameter& p) { return !Muon::takes(p); }), rest);
+  }
+};
+
+/// The rate of a step by its number.
+struct PySchedule {
+  using Bound = void;
+  ScheduleConfig config;
+  int64_t steps = 0;
+  double at(int64_t step) const {
+    if (step < 0) throw InputError("", cat("there is no step ", step), "count the steps from 0");
+    return learning_rate(config, step, steps);
+  }
+};
+
+PySchedule schedule_of(int64_t steps, const std::string& kind, double rate,
+                       const py::kwargs& more) {
+  if (steps < 1) throw InputError("", "a schedule needs 1 step or more", "give steps");
+  ConfigNode tree;
+  tree.kind = ConfigNode::Kind::map;
+  const auto set = [&](const std::string& key, const std::string& value) {
+    apply_override(tree, key + "=" + value);
+  };
+  set("kind", kind);
+  set("rate", py::repr(py::float_(rate)));
+  for (const auto& [key, value] : more) set(py::str(key), py::str(value));
+  PySchedule out;
+  read_config(tree, out.config);
+  out.steps = steps;
+  return out;
+}
+
+/// An average of parameters: exponential with a decay, or alike over all updates.
+class PyAverage {
+ public:
+  using Bound = void;
+  PyAverage(const py::object& parameters, const std::optional<double>& decay)
+      : kept_(named(parameters)) {
+    if (decay) in_range("decay", *decay, *decay > 0 && *decay < 1);
+    std::vector<StateEntry> entries;
+    for (const auto& [name, p] : kept_)
+      entries.push_back({name, &p->value, p.get(), "", "", false});
+    average_.emplace(std::move(entries), decay.value_or(0));
+  }
+  void update() {
+    if (inside_) throw Error("the averages are in the parameters; swap() them back first");
+    const std::lock_guard<std::recursive_mutex> lock(recording());
+    average_->add(++updates_);
+  }
+  void swap() {
+    const std::lock_guard<std::recursive_mutex> lock(recording());
+    average_->exchange();
+    inside_ = !inside_;
+  }
+  int64_t updates() const { return updates_; }
+
+ private:
+  std::vector<std::pair<std::string, PyParameter>> kept_;
+  std::optional<WeightAverage> average_;
+  int64_t updates_ = 0;
+  bool inside_ = false;  // the parameters hold the averages
 };
 
 template <class Class>
@@ -138,12 +277,21 @@ void add_steps(Class& c) {
   c.def(
        "step",
        [](typename Class::type& self, const PyGradients& g, const std::optional<double>& rate,
-          double scale) { self.step(g.gradients, rate, scale); },
+          double scale, const std::optional<double>& clip,
+          const std::optional<double>& clip_value) {
+         self.step(g.gradients, rate, scale, clip, clip_value);
+       },
        py::arg("gradients"), py::arg("rate") = py::none(), py::arg("scale") = 1.0,
-       "One update by the gradients times scale; a parameter without one stays.")
+       py::arg("clip") = py::none(), py::arg("clip_value") = py::none(),
+       "One update by the gradients times scale; a parameter without one stays. Numbers beyond "
+       "clip_value are cut to it, then the norm of all to clip, as torch's clip_grad_value_ and "
+       "clip_grad_norm_ do.")
       .def_property("rate", &PyOptimiser::rate, &PyOptimiser::set_rate)
       .def("state_dict", &PyOptimiser::state)
       .def("load_state_dict", &PyOptimiser::load, py::arg("state"));
+  refuse_copies(c,
+                "an optimiser cannot be copied or pickled, as it writes to parameters of its own: "
+                "take its state_dict(), and give it to load_state_dict() of a new one");
 }
 
 }  // namespace
@@ -157,6 +305,27 @@ void add_optim(py::module_& m) {
            py::arg("parameters"), py::arg("rate") = 1e-3, py::arg("beta1") = 0.9,
            py::arg("beta2") = 0.999, py::arg("eps") = 1e-8, py::arg("weight_decay") = 0.0);
   add_steps(adam);
+  py::class_<PyAdamW> adamw(m, "AdamW",
+                            "Adam whose weights shrink by rate times weight_decay in a step, apart "
+                            "from the gradient, as torch.optim.AdamW's.");
+  adamw.def(py::init<const py::object&, double, double, double, double, double>(),
+            py::arg("parameters"), py::arg("rate") = 1e-3, py::arg("beta1") = 0.9,
+            py::arg("beta2") = 0.999, py::arg("eps") = 1e-8, py::arg("weight_decay") = 0.01);
+  add_steps(adamw);
+  py::class_<PySgd> sgd(m, "SGD",
+                        "Plain steps along the gradient, or along its running sum, as "
+                        "torch.optim.SGD's without dampening.");
+  sgd.def(py::init<const py::object&, double, double, bool, double>(), py::arg("parameters"),
+          py::arg("rate") = 1e-3, py::arg("momentum") = 0.0, py::arg("nesterov") = false,
+          py::arg("weight_decay") = 0.0);
+  add_steps(sgd);
+  py::class_<PyLion> lion(m, "Lion",
+                          "Lion (Chen et al. 2023): every number moves by the rate, in the "
+                          "direction of the sign of an average of gradients.");
+  lion.def(py::init<const py::object&, double, double, double, double>(), py::arg("parameters"),
+           py::arg("rate") = 1e-4, py::arg("beta1") = 0.9, py::arg("beta2") = 0.99,
+           py::arg("weight_decay") = 0.0);
+  add_steps(lion);
   py::class_<PyMuon> muon(
       m, "Muon",
       "Muon (Jordan 2024) for matrices of 32 rows and columns or more, Adam for the rest. One rate "
@@ -166,6 +335,34 @@ void add_optim(py::module_& m) {
            py::arg("step") = 0.2, py::arg("beta1") = 0.9, py::arg("beta2") = 0.999,
            py::arg("eps") = 1e-8, py::arg("weight_decay") = 0.0);
   add_steps(muon);
+  py::class_<PySchedule>(m, "Schedule",
+                         "The learning rate of each step of a training of `steps` steps. Further "
+                         "keys are those of a configuration's optimiser.schedule: warmup, "
+                         "final_fraction, milestones, factor, power, period, period_factor, rise, "
+                         "initial_fraction.")
+      .def(py::init(&schedule_of), py::arg("steps"), py::arg("kind") = "constant",
+           py::arg("rate") = 1e-3)
+      .def("__call__", &PySchedule::at, py::arg("step"), "The rate of a step; the first is 0.");
+  py::class_<PyAverage> average(m, "Average",
+                                "An average of parameters: exponential with decay (EMA; the first "
+                                "updates count more), else the mean of all updates (SWA).");
+  average
+      .def(py::init<const py::object&, const std::optional<double>&>(), py::arg("parameters"),
+           py::arg("decay") = py::none())
+      .def("update", &PyAverage::update, "Adds what the parameters are now.")
+      .def("swap", &PyAverage::swap,
+           "The averages into the parameters, and the other way round when called again.")
+      .def_property_readonly("updates", &PyAverage::updates)
+      .def(
+          "__enter__",
+          [](PyAverage& self) -> PyAverage& {
+            self.swap();
+            return self;
+          },
+          py::return_value_policy::reference_internal)
+      .def("__exit__", [](PyAverage& self, const py::args&) { self.swap(); });
+  refuse_copies(average,
+                "an Average cannot be copied or pickled, as it is of parameters of its own");
 }
 
 }  // namespace restage::python

@@ -46,18 +46,21 @@ py::list clouds(const py::object& path, const std::optional<int64_t>& sequence,
   return out;
 }
 
-py::dict motion(const py::object& path, const std::string& clip, const std::string& bones) {
+py::dict motion(const py::object& path, const std::string& clip, const std::string& bones,
+                const std::string& person) {
   const std::string file = path_of(path);
   SkeletonTake take;
   {
     const py::gil_scoped_release released;
     std::string why;
     if (!holds_take(file, bones, &why))
-      throw InputError(file, "holds no motion of a skeleton" + (why.empty() ? "" : ": " + why),
-                       "give BVH, AMC, glTF, VRM, AMASS (.npz) or our motions (.h5)");
+      throw InputError(
+          file, "holds no motion of a skeleton" + (why.empty() ? "" : ": " + why),
+          "give BVH, AMC, glTF, VRM, AMASS, a pose estimator's file or our motions (.h5)");
     TakeOptions options;
     options.clip = clip;
     options.motion.profile = bones;
+    options.person = person;
     take = read_take(file, options);
   }
   std::vector<double> joints;

@@ -71,7 +71,8 @@ py::dict dict_of(Arrays arrays, const std::string& document) {
   return out;
 }
 
-std::vector<Cloud> clouds_of(const py::handle& source) {
+std::vector<Cloud> clouds_of(const py::object& given) {
+  const py::object source = array_or_same(given, "source");
   if (!py::isinstance<py::iterable>(source))
     throw InputError("source", "is neither a file's name nor a sequence of clouds",
                      "give a path, or arrays of [n, 3]");

@@ -10,6 +10,7 @@
 #include "experiments/cli/perform/source_options.h"
 #include "experiments/source.h"
 #include "python/arrays.h"
+#include "python/copies.h"
 
 namespace restage::python {
 namespace {
@@ -213,8 +214,11 @@ void add_frame(py::module_& m) {
 
 void add_system(py::module_& m) {
   add_frame(m);
-  py::class_<PySystem>(m, "System")
-      .def(py::init<const py::object&, const py::object&, const py::dict&>())
+  py::class_<PySystem> system(m, "System");
+  refuse_copies(system,
+                "a System cannot be copied or pickled, as it is in the middle of a motion: make "
+                "one where it is needed, restage.System(target, weights)");
+  system.def(py::init<const py::object&, const py::object&, const py::dict&>())
       .def("push_all", &PySystem::push_all, py::arg("points"), py::arg("name") = "cloud",
            "Takes the next cloud, [n, 3] in metres, y up (or as scale and source_up say), and "
            "returns the frames that it finishes, as a list. InputError leaves the system as it "

@@ -3,7 +3,7 @@
 
 #include "autograd/kernels/kernel.h"
 #include "python/arrays.h"
-#include "python/engine.h"
+#include "python/dlpack.h"
 
 namespace restage::python {
 namespace {
@@ -58,6 +58,24 @@ void copy_into(Tensor& t, const py::handle& value) {
   t.written();
 }
 
+/// What pickle and copy carry.
+py::tuple tensor_state(const Tensor& t) {
+  const Tensor here = t.cpu();
+  const auto size = static_cast<size_t>(here.numel()) * size_of(here.dtype());
+  const auto* bytes = size == 0 ? "" : static_cast<const char*>(here.bytes());
+  return py::make_tuple(name_of(here.dtype()), tuple_of(here.shape()), py::bytes(bytes, size));
+}
+
+Tensor tensor_of_state(const py::tuple& state) {
+  if (state.size() != 3) refuse("this is no state of a tensor");
+  const auto bytes = state[2].cast<std::string_view>();
+  Tensor out = Tensor::empty(shape_of(state[1]), dtype_of(state[0].cast<std::string>()));
+  if (bytes.size() != static_cast<size_t>(out.numel()) * size_of(out.dtype()))
+    refuse("this is no state of a tensor");
+  if (!bytes.empty()) std::memcpy(out.bytes(), bytes.data(), bytes.size());
+  return out;
+}
+
 std::string text_of(const Tensor& t) {
   return "Tensor(" + t.shape().str() + ", " + name_of(t.dtype()) + ")";
 }
@@ -103,8 +121,7 @@ Tensor tensor_of(const py::handle& value, bool share) {
   if (py::isinstance<Tensor>(value)) return value.cast<Tensor>();
   if (!value || value.is_none() || py::isinstance<py::str>(value)) refuse("there is no array");
   refuse_mask(value, "tensor");
-  py::array any = py::array::ensure(value);
-  if (!any) PyErr_Clear(), refuse("there is no array");
+  const py::array any = array_like(value, "tensor");
   const DType type = held_as(any.dtype());
   if (any.ndim() > Shape::kMaxRank) refuse("more than six dimensions");
   Shape shape;
@@ -115,7 +132,7 @@ Tensor tensor_of(const py::handle& value, bool share) {
   if (!as_held) throw py::error_already_set();
   void* data = const_cast<void*>(as_held.data());
   // What may not be written to is no memory for a tensor, which assign() writes to.
-  if (share && (data != any.data() || !py::isinstance<py::array>(value) || !as_held.writeable()))
+  if (share && (data != any.data() || !lends_memory(value) || !as_held.writeable()))
     refuse(
         "copy=False: this array's memory cannot be shared; give a C-contiguous array of float32, "
         "float64, int32 or int64 that may be written to, or leave copy out");
@@ -150,12 +167,15 @@ Tensor index_of(const py::handle& value) {
 }
 
 void add_tensor(py::module_& m) {
-  py::class_<Tensor>(m, "Tensor",
-                     R"(Numbers in memory: float32, float64, int32 or int64, up to six axes.
+  py::class_<Tensor> tensor(m, "Tensor",
+                            R"(Numbers in memory: float32, float64, int32 or int64, up to six axes.
 
 Tensor(array) copies; Tensor(array, copy=False) shares the array's memory and keeps the array alive; ShapeError where
-it cannot. Who changes the array then changes the tensor, unseen by a tape: never between forward and backward. NumPy sees a tensor through numpy() or np.asarray(), without a
-copy and read-only, since a tape relies on what it was given; assign() writes.)")
+it cannot. Who changes the array then changes the tensor, unseen by a tape: never between forward and backward. NumPy sees a tensor through numpy() or np.asarray(), PyTorch through torch.from_dlpack(), without a
+copy and only to be read, since a tape relies on what it was given; assign() writes. array: whatever NumPy takes, and
+what offers its memory by DLPack, as PyTorch's tensors on the CPU do.)");
+  offer_memory(tensor, [](const Tensor& t) { return t; });
+  tensor
       .def(py::init([](const py::object& a, bool copy, const std::optional<std::string>& dtype) {
              Tensor out = tensor_of(a, !copy);
              if (copy && py::isinstance<Tensor>(a)) out = out.clone();
@@ -175,14 +195,6 @@ copy and read-only, since a tape relies on what it was given; assign() writes.)"
       .def_property_readonly("version", &Tensor::version, "how often the memory was written to")
       .def(
           "numpy", [](const Tensor& t) { return array_of(t); }, "A read-only view.")
-      .def(
-          "__array__",
-          [](const Tensor& t, const py::object& dtype, const py::object&) -> py::object {
-            const py::array out = array_of(t);
-            return dtype.is_none() ? py::object(out)
-                                   : out.attr("astype")(dtype, py::arg("copy") = false);
-          },
-          py::arg("dtype") = py::none(), py::arg("copy") = py::none())
       .def("assign", &copy_into, py::arg("values"),
            "Takes the values of an array of the same shape into this memory.")
       .def("clone", &Tensor::clone, "The same numbers in memory of their own.")
@@ -195,7 +207,8 @@ copy and read-only, since a tape relies on what it was given; assign() writes.)"
           },
           py::arg("index") = 0)
       .def("__len__", [](const Tensor& t) { return t.rank() == 0 ? int64_t{0} : t.size(0); })
-      .def("__repr__", &text_of);
+      .def("__repr__", &text_of)
+      .def(py::pickle(&tensor_state, &tensor_of_state));
 }
 
 }  // namespace restage::python

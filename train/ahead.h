@@ -3,6 +3,7 @@
 
 #include <future>
 
+#include "train/phases.h"
 #include "train/stage.h"
 
 namespace restage {
@@ -16,6 +17,7 @@ class Ahead {
   /// host's own cores. Steps in several micro-batches draw their own.
   template <class Draw>
   Batch take(bool ahead, int64_t step, const MicroBatch& part, Draw draw) {
+    const PhaseScope drawing(Phase::draw);  // or waiting for what is drawn
     if (!ahead || part.of > 1) return draw(step, part);
     const bool ready = next_.valid() && next_step_ == step;
     if (next_.valid() && !ready) next_.wait();

@@ -146,6 +146,11 @@ void Progress::note(const std::string& text) {
   if (bar_shown_) draw_bar();
 }
 
+void Progress::clear() {
+  if (bar_shown_) out_.write(kClearLine);
+  bar_shown_ = false;
+}
+
 void Progress::finish() {
   if (out_.quiet || finished_) return;
   finished_ = true;

@@ -39,6 +39,8 @@ class Progress {
   void update(int64_t done, const Values& values = {});
   /// A line of text of its own (a validation result), above the bar.
   void note(const std::string& text);
+  /// Takes the bar away until the next update, for a line that somebody else writes.
+  void clear();
   /// The last state and the time it took; later calls do nothing.
   void finish();
 

@@ -4,7 +4,9 @@
 //   provenance.json  version, compiler, processor, data, command line (train/run_provenance.h)
 //   metrics.jsonl    one JSON object per line: {"step": 10, "stage": "smrm", "loss": 0.5, ...}
 //   log.txt          the log of every process that worked on the run
+//   summary.json     how a training ended, and its warnings (experiments/observers/summary.h)
 //   checkpoints/     <stage>-<step>-<checksum>.safetensors
+//   best/            weights of the best validations (loop.keep_best; train/best_files.h)
 //   .lock            held (flock) by the process that trains
 //
 // A checkpoint appears by rename and carries the checksum of its bytes in its name, so it is either

@@ -76,6 +76,43 @@ Json flat(const std::string& yaml) {
                    "STAGE.init=)");
 }
 
+/// What a run says of itself.
+Json begun(const std::string& dir) {
+  const std::string path = dir + "/provenance.json";
+  Json out = Json::parse(read_file(path, 1 << 22), nullptr, false);
+  if (!out.is_object() || !out.contains("configuration") || !out["configuration"].is_object() ||
+      !out.contains("data") || !out["data"].is_array())
+    throw InputError(path, "does not say what the run was made of",
+                     "resume it with the version of restage that began it");
+  return out;
+}
+
+/// Takes away entries of maps of which `known` has no value. Lists stay or go whole.
+void keep_known(const Json& known, const std::string& path, ConfigNode* node) {
+  std::erase_if(node->children, [&](ConfigNode& child) {
+    const std::string name = path.empty() ? child.key : path + "." + child.key;
+    Json values = Json::object();
+    flatten(child, name, &values);
+    if (child.kind == ConfigNode::Kind::map) keep_known(known, name, &child);
+    bool any = values.empty();
+    for (const auto& item : values.items()) any = any || known.contains(item.key());
+    return !any;
+  });
+}
+
+/// A run that an earlier version began does not say what its networks were.
+void check_sources(const std::string& dir, const Json& then, const RunInput& input) {
+  const auto known = then.find("networks");
+  if (known == then.end() || !known->is_object()) return;
+  for (const RunInput::Network& network : input.networks) {
+    const auto entry = known->find(network.stage);
+    if (entry == known->end() || !entry->is_object()) continue;
+    const auto source = entry->find("source");
+    if (source != entry->end() && *source != network.source)
+      refuse(dir, "the source of the network '" + network.model + "' has changed");
+  }
+}
+
 }  // namespace
 
 std::string provenance_json(const RunInput& input) {
@@ -94,23 +131,35 @@ std::string provenance_json(const RunInput& input) {
   for (const auto& file : input.data)
     json["data"].push_back(
         nlohmann::ordered_json{{"path", file.path}, {"checksum", file.checksum}});
+  for (const auto& network : input.networks)
+    json["networks"][network.stage] = {{"model", network.model}, {"source", network.source}};
   json["configuration"] = flat(input.resolved_yaml);
   return json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
 }
 
-void check_same_run(const std::string& dir, const RunInput& input) {
-  const std::string path = dir + "/provenance.json";
-  const Json then = Json::parse(read_file(path, 1 << 22), nullptr, false);
-  if (!then.is_object() || !then.contains("configuration") || !then["configuration"].is_object() ||
-      !then.contains("data") || !then["data"].is_array())
-    throw InputError(path, "does not say what the run was made of",
-                     "resume it with the version of restage that began it");
-  const Json now = flat(input.resolved_yaml);
+ConfigNode known_then(const std::string& dir, ConfigNode tree) {
+  keep_known(begun(dir)["configuration"], "", &tree);
+  return tree;
+}
+
+void check_same_run(const std::string& dir, const RunInput& input,
+                    const std::vector<std::string>& overrides, const std::string& defaults) {
+  const auto overridden = [&](const std::string& key) {
+    return std::any_of(overrides.begin(), overrides.end(), [&](const std::string& text) {
+      const std::string own = text.substr(0, text.find('='));
+      return key == own || key.starts_with(own + ".");  // an item of a list
+    });
+  };
+  const Json then = begun(dir), now = flat(input.resolved_yaml), usual = flat(defaults);
   for (const auto& [key, value] : then["configuration"].items())
-    if (!now.contains(key) || now[key] != value)
+    if (!overridden(key) && (!now.contains(key) || now[key] != value))
       refuse(dir, "'" + key + "' of config.yaml has changed from " + value.dump());
-  for (const auto& [key, value] : now.items())
-    if (!then["configuration"].contains(key)) refuse(dir, "'" + key + "' of config.yaml is new");
+  for (const auto& [key, value] : now.items()) {
+    if (then["configuration"].contains(key) || overridden(key)) continue;
+    if (!usual.contains(key) || usual[key] != value)
+      refuse(dir, "'" + key + "' of config.yaml is new and not its default");
+  }
+  check_sources(dir, then, input);
   std::vector<std::string> sums;
   for (const Json& file : then["data"]) sums.push_back(file.value("checksum", ""));
   for (size_t i = 0; i < std::max(sums.size(), input.data.size()); ++i)

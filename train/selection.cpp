@@ -11,20 +11,34 @@ namespace restage {
 namespace {
 
 const std::string kAverage = "loop.ema.";
-constexpr const char *kBest = "loop.best", *kCounts = "loop.best_counts";
+constexpr const char *kBest = "loop.best", *kCounts = "loop.best_counts", *kMark = "loop.best_mark";
 
 }  // namespace
 
-WeightAverage::WeightAverage(Stage& stage, double decay)
-    : weights_(stage.weights()), decay_(decay) {
+WeightAverage::WeightAverage(Stage& stage, const SelectionConfig& config)
+    : weights_(stage.weights()), decay_(config.ema) {
+  for (const StateEntry& entry : weights_) {
+    average_.push_back(entry.value->clone());
+    averaged_.push_back(entry.parameter != nullptr && !stage.frozen(entry.parameter->id));
+  }
+  if (config.swa_from > 0)
+    first_ = static_cast<int64_t>(config.swa_from * static_cast<double>(stage.steps()));
+}
+
+WeightAverage::WeightAverage(std::vector<StateEntry> parameters, double decay)
+    : weights_(std::move(parameters)), averaged_(weights_.size(), true), decay_(decay) {
   for (const StateEntry& entry : weights_) average_.push_back(entry.value->clone());
+  if (decay == 0) first_ = 0;
 }
 
 void WeightAverage::add(int64_t done) {
-  const auto t = static_cast<double>(done);
-  const double keep = std::min(decay_, (1 + t) / (10 + t));
+  const auto t = static_cast<double>(done), n = static_cast<double>(done - first_);
+  mix(first_ < 0 ? std::min(decay_, (1 + t) / (10 + t)) : n > 1 ? (n - 1) / n : 0);
+}
+
+void WeightAverage::mix(double keep) {
   for (size_t i = 0; i < weights_.size(); ++i) {
-    if (weights_[i].parameter != nullptr)
+    if (averaged_[i] && keep > 0)
       launch(MixArgs{*weights_[i].value, average_[i], keep, 1 - keep});
     else
       average_[i] = weights_[i].value->clone();
@@ -46,19 +60,25 @@ void WeightAverage::load(const TensorFile& file, const std::string& where) {
                               average_[i].device());
 }
 
-bool BestSoFar::add(int64_t done, const NamedValues& figures) {
+const std::pair<std::string, double>& figure_monitored(const NamedValues& figures,
+                                                       const std::string& monitor) {
   const auto found = std::find_if(figures.begin(), figures.end(), [&](const auto& figure) {
-    return monitor_.empty() || figure.first == monitor_;
+    return monitor.empty() || figure.first == monitor;
   });
   if (found == figures.end())
-    throw InputError("", "the validation has no '" + monitor_ + "'", "name another in monitor");
-  const double value = found->second;
-  const bool better = std::isfinite(value) && (step_ < 0 || value < value_ - min_delta_);
-  if (!better) {
+    throw InputError("", "the validation has no '" + monitor + "'", "name another in monitor");
+  return *found;
+}
+
+bool BestSoFar::add(int64_t done, const NamedValues& figures) {
+  const double value = figure_monitored(figures, monitor_).second;
+  const bool good = std::isfinite(value), first = step_ < 0;
+  if (good && (first || value < mark_ - min_delta_))
+    mark_ = value, worse_ = 0;
+  else
     ++worse_;
-    return false;
-  }
-  value_ = value, step_ = done, worse_ = 0;
+  if (!good || (!first && !(value < value_))) return false;
+  value_ = value, step_ = done;
   return true;
 }
 
@@ -70,10 +90,12 @@ std::string BestSoFar::text() const {
 void BestSoFar::save(TensorFile* file) const {
   file->tensors[kBest] = Tensor::from<double>({1}, {value_});
   file->tensors[kCounts] = Tensor::from<int64_t>({2}, {step_, worse_});
+  if (min_delta_ > 0) file->tensors[kMark] = Tensor::from<double>({1}, {mark_});
 }
 
 void BestSoFar::load(const TensorFile& file, const std::string& where) {
   value_ = saved_state(file, kBest, {1}, where).data<double>()[0];
+  mark_ = min_delta_ > 0 ? saved_state(file, kMark, {1}, where).data<double>()[0] : value_;
   const Tensor counts = saved_state(file, kCounts, {2}, where);
   step_ = counts.data<int64_t>()[0], worse_ = counts.data<int64_t>()[1];
 }

@@ -11,6 +11,9 @@
 #include "autograd/base/parallel.h"
 #include "autograd/base/thread_groups.h"
 #include "autograd/kernels/kernel.h"
+#include "nn/models/own_training.h"
+#include "train/gradient_watch.h"
+#include "train/phases.h"
 
 namespace restage {
 namespace {
@@ -90,7 +93,8 @@ Optimiser* Stage::add_optimiser(const std::string& name, const std::vector<std::
     if (optimisation_.steps > 0 && count_parameters(*module) == 0)
       throw InputError("", "the model of stage '" + name_ + "' has nothing to learn",
                        "set " + name_ + ".optimiser.steps=0 to use it as it is");
-  optimisers_.push_back({name, std::make_unique<Optimiser>(modules, config)});
+  optimisers_.push_back(
+      {name, std::make_unique<Optimiser>(modules, config, name_ + ".optimiser.groups")});
   return optimisers_.back().optimiser.get();
 }
 
@@ -99,19 +103,43 @@ OptimisedNumbers Stage::optimised() const {
   for (const NamedOptimiser& o : optimisers_) {
     out.muon += o.optimiser->numbers().muon;
     out.adam += o.optimiser->numbers().adam;
+    out.frozen += o.optimiser->numbers().frozen;
   }
+  return out;
+}
+
+bool Stage::frozen(uint64_t id) const {
+  return std::any_of(optimisers_.begin(), optimisers_.end(),
+                     [id](const NamedOptimiser& o) { return o.optimiser->frozen(id); });
+}
+
+NamedValues Stage::measure() {
+  NamedValues out = validate();
+  const NamedValues measured = out;
+  for (const Network& n : networks_)
+    if (const auto* own = dynamic_cast<const OwnTraining*>(n.model.net.get()))
+      for (auto& figure : own->measure(measured)) out.push_back(std::move(figure));
+  return out;
+}
+
+std::vector<std::string> Stage::own_figures() const {
+  std::vector<std::string> out;
+  for (const Network& n : networks_)
+    for (const std::string& figure : model_type(n.model.model).figures) out.push_back(figure);
   return out;
 }
 
 void Stage::save(TensorFile& file) const {
   for (const Network& n : networks_) append(&file, *n.model.net, prefix_of(n.role));
   for (const NamedOptimiser& o : optimisers_) o.optimiser->save(o.name + ".", file);
+  if (noise_) noise_->save(&file);
   save_more(file);
 }
 
 void Stage::load(const TensorFile& file, const std::string& where) {
   for (const Network& n : networks_) load_state(*n.model.net, file, prefix_of(n.role), where);
   for (const NamedOptimiser& o : optimisers_) o.optimiser->load(o.name + ".", file, where);
+  if (noise_) noise_->load(file, where);
   load_more(file, where);
 }
 
@@ -277,15 +305,32 @@ class Row {
 
 }  // namespace
 
+void Stage::measure_noise() {
+  if (micro_batches_ < 2)
+    throw InputError("loop.gradient_noise", "needs steps of several micro-batches",
+                     "set loop.micro_batches to 2 or more, or leave it out");
+  noise_.emplace(examples_per_step(), micro_batches_);
+}
+
+NamedValues Stage::noise() const { return noise_ ? noise_->values() : NamedValues{}; }
+
 Differentiated Stage::parts(const Optimiser& optimiser,
                             const std::function<Differentiated(const MicroBatch&)>& compute) {
-  if (micro_batches_ == 1) return compute({});
+  Differentiated out = micro_batches_ == 1 ? compute({}) : summed(optimiser, compute);
+  if (watch_ != nullptr) watch_->look(&optimiser, out.gradients, out.norm);
+  return out;
+}
+
+Differentiated Stage::summed(const Optimiser& optimiser,
+                             const std::function<Differentiated(const MicroBatch&)>& compute) {
   Row row(state(), optimiser.parameters());
   const std::unique_ptr<Team::Sum> sum = team_->sum(row.width());
+  const bool noisy = noise_ && &optimiser == optimisers_.front().optimiser.get();
   std::vector<std::vector<double>> mine;
   const auto give = [&](const Differentiated& d) {
     sum->give(row.of(d.gradients));
     mine.push_back(d.values);
+    if (noisy) mine.back().push_back(std::pow(d.gradients.norm(optimiser.parameters()), 2));
     mine.back().push_back(d.loss);
   };
   const auto number = [&](int64_t k) {
@@ -318,6 +363,10 @@ Differentiated Stage::parts(const Optimiser& optimiser,
   }
   out.loss = out.values.back();
   out.values.pop_back();
+  if (noisy) {
+    noise_->add(out.values.back(), std::pow(out.gradients.norm(optimiser.parameters()), 2));
+    out.values.pop_back();
+  }
   return out;
 }
 
@@ -325,7 +374,11 @@ Differentiated differentiate(const RngKey& key, const std::function<Var(Context&
   const auto run = [&] {
     Tape tape;
     Context ctx{&tape, true, key};
-    const Var value = loss(ctx);
+    const Var value = [&] {
+      const PhaseScope phase(Phase::forward);
+      return loss(ctx);
+    }();
+    const PhaseScope phase(Phase::backward);
     Differentiated out;
     out.gradients = tape.backward(value);
     out.loss = value.value.cpu().item();

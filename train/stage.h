@@ -16,11 +16,14 @@
 #include "nn/module.h"
 #include "nn/weights/bundle.h"
 #include "nn/weights/state.h"
+#include "train/gradient_noise.h"
 #include "train/model_choice.h"
 #include "train/optim/optimiser.h"
 #include "train/team.h"
 
 namespace restage {
+
+class GradientWatch;
 
 using NamedValues = std::vector<std::pair<std::string, double>>;
 
@@ -105,6 +108,10 @@ class Stage {
   /// The names of those figures with this configuration, in their order. Empty: not known before
   /// the first validation.
   virtual std::vector<std::string> figures() { return {}; }
+  /// validate(), and the figures that its networks bring with them (nn/models/own_training.h).
+  NamedValues measure();
+  /// The names of the latter.
+  std::vector<std::string> own_figures() const;
 
   /// Held-out examples with what the stage makes of them, at most three rows; may be empty.
   virtual std::vector<Shown> show() { return {}; }
@@ -120,8 +127,19 @@ class Stage {
                   const std::string& where);
   bool started_from_weights() const { return started_from_weights_; }
   bool wants_muon() const { return optimisation_.kind == OptimiserConfig::Kind::muon; }
-  /// How many numbers its optimisers leave to Muon and to Adam.
+  /// How many numbers its optimisers leave to Muon and to the other rule, and how many stay.
   OptimisedNumbers optimised() const;
+  /// Whether a parameter never moves (optimiser.groups).
+  bool frozen(uint64_t id) const;
+  /// Parameters and buffers of all networks, under the names of a checkpoint.
+  std::vector<StateEntry> state() const;
+  /// From now on shows the gradients of every step to `watch` (null: to nobody).
+  void show_gradients(GradientWatch* watch) { watch_ = watch; }
+  /// Has the steps measure how much gradients of micro-batches differ. InputError: a step is not
+  /// cut into several (cut_steps()).
+  void measure_noise();
+  /// Figures of that, after the steps so far; empty if it is not measured.
+  NamedValues noise() const;
   /// The networks to be used later, by role. If the stage works in the host's memory they are
   /// shared with it, else they are copies in the host's memory.
   virtual Bundle result() const;
@@ -181,8 +199,8 @@ class Stage {
     std::string name;
     std::unique_ptr<Optimiser> optimiser;
   };
-  /// Parameters and buffers of all networks, under the names of a checkpoint.
-  std::vector<StateEntry> state() const;
+  Differentiated summed(const Optimiser& optimiser,
+                        const std::function<Differentiated(const MicroBatch&)>& compute);
 
   std::string name_;
   Device device_;
@@ -191,6 +209,8 @@ class Stage {
   bool started_from_weights_ = false;
   std::vector<Network> networks_;
   std::vector<NamedOptimiser> optimisers_;
+  GradientWatch* watch_ = nullptr;
+  std::optional<GradientNoise> noise_;  ///< of the first optimiser
 };
 
 }  // namespace restage

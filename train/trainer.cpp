@@ -13,8 +13,11 @@
 #include "autograd/base/log.h"
 #include "autograd/base/words.h"
 #include "autograd/kernels/stats.h"
+#include "train/best_files.h"
 #include "train/failure.h"
 #include "train/forecast.h"
+#include "train/phases.h"
+#include "train/stage_watch.h"
 #include "train/throughput.h"
 
 namespace restage {
@@ -23,6 +26,8 @@ namespace {
 constexpr int64_t kForecastAfter = 30;  // steps
 // In a checkpoint whose validation was left unfinished.
 constexpr const char* kUnvalidated = "loop.unvalidated";
+// In one after which the stage is over, as an observer said.
+constexpr const char* kToldToEnd = "loop.told_to_end";
 
 std::string line(const NamedValues& values) {
   return joined(values, [](const auto& one) { return one.first + format(" %.5g", one.second); });
@@ -63,8 +68,11 @@ class StageRun {
         run_(run),
         loop_(loop),
         options_(options),
-        best_(monitored(loop.selection, stage.name()), loop.selection.min_delta) {
-    if (loop.selection.ema > 0) average_.emplace(stage, loop.selection.ema);
+        monitor_(monitored(loop.selection, stage.name())),
+        best_(monitor_, loop.selection.min_delta),
+        best_files_(run.dir(), stage.name(), loop.selection.keep_best),
+        watch_(stage) {
+    if (WeightAverage::wanted(loop.selection)) average_.emplace(stage, loop.selection);
   }
 
   /// Removes the checkpoints that a stage need not keep once a later stage has begun.
@@ -76,12 +84,20 @@ class StageRun {
     if (average_) average_->load(file, checkpoint.path);
     if (loop_.selection.judges()) best_.load(file, checkpoint.path);
     unvalidated_ = file.find(kUnvalidated) != nullptr;
+    told_to_end_ = file.find(kToldToEnd) != nullptr;
     done_ = checkpoint.step;
     resumed_ = true;
   }
 
+  /// The same of a run that was resumed.
+  void resume_from(const Checkpoint& checkpoint) {
+    go_on_from(checkpoint);
+    best_files_.forget_after(done_);
+  }
+
   /// Trains the stage to its end; then the stage holds the weights that it hands on.
   void run() {
+    if (!resumed_) best_files_.forget_after(-1);
     tell([&](TrainObserver& o) { o.on_begin(stage_, done_); });
     if (stage_.steps() == 0) {
       if (!resumed_ || unvalidated_) settle(true, true, log_info);
@@ -94,7 +110,7 @@ class StageRun {
  private:
   bool ended_early() const {
     const int64_t patience = loop_.selection.patience;
-    return patience > 0 && best_.worse() >= patience;
+    return told_to_end_ || (patience > 0 && best_.worse() >= patience);
   }
   bool hands_on_best() const {
     return loop_.selection.choice == SelectionConfig::Export::best && best_.step() >= 0;
@@ -119,16 +135,24 @@ class StageRun {
   std::string forecast() const;
   void report(int64_t steps, int64_t blocks_before, double waited_before) const;
 
+  void warn(const std::vector<TrainWarning>& warnings);
+
   Stage& stage_;
   const Bundle& given_;
   RunDir& run_;
   const LoopConfig& loop_;
   const TrainOptions& options_;
   std::optional<WeightAverage> average_;
+  const std::string monitor_;
   BestSoFar best_;
+  BestFiles best_files_;
   Throughput throughput_;
+  StageWatch watch_;
+  PhaseTimes phases_;             ///< of the last step
+  Progress* progress_ = nullptr;  ///< what the terminal shows
   int64_t done_ = 0;
   bool resumed_ = false;
+  bool told_to_end_ = false;  ///< by an observer
   bool unvalidated_ = false;  ///< a stop came before the end of the validation that was due
 };
 
@@ -143,8 +167,11 @@ void StageRun::all_steps() {
                   static_cast<long long>(stage_.steps()),
                   static_cast<long long>(stage_.examples_per_step())));
   if (stage_.wants_muon()) log_optimisers(stage_);
+  if (const int64_t frozen = stage_.optimised().frozen; frozen > 0)
+    log_info(cat(stage_.name(), ": ", frozen, " numbers are frozen"));
   Progress progress(stage_.name(), stage_.steps(), standard_progress(options_.quiet), first);
   const Note note = [&](const std::string& said) { progress.note(said); };
+  progress_ = &progress;
   try {
     // What the training must beat, and what is handed on if no later validation is better.
     if (stage_.started_from_weights() && !resumed_) settle(true, loop_.selection.judges(), note);
@@ -155,6 +182,7 @@ void StageRun::all_steps() {
     throw;
   }
   progress.finish();
+  progress_ = nullptr;
   if (done_ > first) report(done_ - first, blocks_before, waited_before);
 }
 
@@ -171,6 +199,7 @@ void StageRun::one_step(Progress* progress, int64_t first, const Note& note) {
   progress->update(done_, shown);
   if (done_ - first == kForecastAfter && stage_.steps() > 10 * done_) note(forecast());
   tell([&](TrainObserver& o) { o.on_step(stage_, done_, values); });
+  warn(watch_.after_step(values, phases_));
   settle(due(loop_.validate_every), due(loop_.checkpoint_every), note);
 }
 
@@ -184,18 +213,29 @@ void StageRun::settle(bool validates, bool saves, const Note& note) {
   if (stopped) end_stopped();
 }
 
+void StageRun::warn(const std::vector<TrainWarning>& warnings) {
+  for (const TrainWarning& one : warnings) {
+    if (progress_ != nullptr) progress_->clear();
+    log_warning(one.said);
+    tell([&](TrainObserver& o) { o.on_warning(stage_.name(), done_, one); });
+  }
+}
+
 NamedValues StageRun::step() {
   take_kernel_stats();  // forgets what a validation did
+  take_phase_times();
   const auto start = std::chrono::steady_clock::now();
   NamedValues values;
   try {
     const MatmulPrecisionScope scope(options_.precision);
+    const PhaseScope phase(Phase::step);
     values = stage_.step(done_);
   } catch (const NonFiniteError& error) {
     throw NonFiniteError(std::string(error.what()) + "; 'restage replay " + keep_failure(error) +
                          "' repeats the step");
   }
   ++done_;
+  phases_ = take_phase_times();
   if (average_) average_->add(done_);
   const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
   const KernelStats work = take_kernel_stats();
@@ -204,6 +244,7 @@ NamedValues StageRun::step() {
     values.emplace_back("active_share", work.active_share);
     values.emplace_back("active_score_share", work.active_score_share);
   }
+  for (const auto& one : stage_.noise()) values.push_back(one);
   return values;
 }
 
@@ -233,11 +274,15 @@ void StageRun::validate(const Note& note) {
   if (average_) average_->exchange();
   std::optional<NamedValues> scores;
   try {
-    scores = stage_.validate();
+    const PhaseScope phase(Phase::validate);
+    scores = stage_.measure();
+    tell([&](TrainObserver& o) { told_to_end_ |= !o.measure(stage_, done_, &*scores); });
   } catch (const Interrupted&) {
+    scores.reset();
   }
   unvalidated_ = !scores;
   if (scores) note(judged(*scores));
+  if (scores) warn(watch_.after_validation(*scores, done_));
   if (average_) average_->exchange();
 }
 
@@ -246,8 +291,14 @@ std::string StageRun::judged(NamedValues scores) {
   if (loop_.selection.judges()) {
     best_.add(done_, scores);
     if (best_.step() != done_) out += " (" + best_.text() + ")";
-    if (ended_early())
+    if (ended_early() && !told_to_end_)
       out += "; ends here, " + std::to_string(best_.worse()) + " validations without a better one";
+  }
+  if (told_to_end_) out += "; ends here, as it was told";
+  if (loop_.selection.keep_best > 0) {
+    const auto& [figure, value] = figure_monitored(scores, monitor_);
+    best_files_.add(done_, figure, value,
+                    [&] { return safetensors_bytes(to_file(stage_.result())); });
   }
   if (hands_on_best()) scores.emplace_back("best_step", static_cast<double>(best_.step()));
   run_.metrics(stage_.name(), done_, scores);
@@ -256,11 +307,13 @@ std::string StageRun::judged(NamedValues scores) {
 }
 
 void StageRun::checkpoint() {
+  const PhaseScope phase(Phase::save);
   TensorFile file;
   stage_.save(file);
   if (average_) average_->save(&file);
   if (loop_.selection.judges()) best_.save(&file);
   if (unvalidated_) file.tensors[kUnvalidated] = Tensor::zeros({1});
+  if (told_to_end_) file.tensors[kToldToEnd] = Tensor::zeros({1});
   const std::string path = run_.save_checkpoint(stage_.name(), done_, safetensors_bytes(file),
                                                 {loop_.keep, loop_.keep_every, best_.step()});
   tell([&](TrainObserver& o) { o.on_checkpoint(stage_, done_, path); });
@@ -313,8 +366,8 @@ Bundle train(RunDir& run, const std::vector<std::string>& stages, const LoopConf
     const auto index = static_cast<std::ptrdiff_t>(i);
     if (resumed && index <= begin) {
       // The stage that was interrupted, or an earlier one that is complete.
-      stage_run.go_on_from(index == begin ? *resumed
-                                          : latest_checkpoint(run.dir(), {stages[i]}).value());
+      stage_run.resume_from(index == begin ? *resumed
+                                           : latest_checkpoint(run.dir(), {stages[i]}).value());
     }
     stage_run.run();
     if (options.team->any(stop_requested())) end_stopped();

@@ -3,6 +3,7 @@
 
 #include "autograd/kernels/matmul_precision.h"
 #include "nn/config/config_reader.h"
+#include "train/gradient_watch.h"
 #include "train/progress.h"
 #include "train/run.h"
 #include "train/selection.h"
@@ -13,6 +14,8 @@ struct LoopConfig {
   int64_t log_every = 50, validate_every = 1000, checkpoint_every = 1000;
   int64_t keep = 2, keep_every = 0, overfit_batches = 0, micro_batches = 1;
   SelectionConfig selection = {};
+  bool gradient_noise = false;
+  std::vector<std::string> logs = {"jsonl"};  ///< experiments/observers writes all but jsonl
 };
 
 template <class V>
@@ -29,6 +32,11 @@ void visit(V& v, LoopConfig& c) {
     "parts of a step that are computed by themselves and added in order; processes share them",
     positive());
   visit(v, c.selection);
+  v("gradient_noise", c.gradient_noise,
+    "measure the gradient noise scale, from a step's micro-batches");
+  v("logs", c.logs,
+    "what a training writes beside metrics.jsonl, which is always there; not in sweeps",
+    one_of({"jsonl", "csv", "tensorboard", "wandb", "mlflow"}));
 }
 
 /// Watches a training. The loop calls its observers on the thread that trains, after it has written
@@ -41,9 +49,14 @@ class TrainObserver {
   virtual void on_step(const Stage&, int64_t /*done*/, const NamedValues&) {}
   /// A line of metrics.jsonl about training steps was written.
   virtual void on_log(const Stage&, int64_t /*done*/, const NamedValues&) {}
+  /// A validation measured these figures; the observer may add some, before anything is decided by
+  /// them. False: the stage ends here, as it does where loop.patience is at its end.
+  virtual bool measure(Stage&, int64_t /*done*/, NamedValues* /*figures*/) { return true; }
   /// A validation was made. The stage still holds the weights that were validated (averaged weights
   /// with loop.ema).
   virtual void on_validation(Stage&, int64_t /*done*/, const NamedValues&) {}
+  /// Something that a user should know; it is in the log already.
+  virtual void on_warning(const std::string& /*stage*/, int64_t /*done*/, const TrainWarning&) {}
   /// A checkpoint is on the disk.
   virtual void on_checkpoint(const Stage&, int64_t /*done*/, const std::string& /*path*/) {}
 };

@@ -48,6 +48,20 @@ void write_all(const void* data, size_t size) {
 void on_crash(int) { end_as(kCrashed); }
 void on_time(int) { end_as(kNoEnd); }
 
+unsigned clock_limit = 0;  // seconds
+double worked_before = 0;  // seconds of processor time at the last alarm
+
+/// A busy machine may let the child wait for long. It is ended by the clock if it hardly works.
+void on_alarm(int) {
+  constexpr double kWorks = 0.01;  // of the time by the clock
+  timespec used{};
+  ::clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &used);
+  const double worked = static_cast<double>(used.tv_sec) + 1e-9 * static_cast<double>(used.tv_nsec);
+  if (worked - worked_before < kWorks * clock_limit) end_as(kNoEnd);
+  worked_before = worked;
+  ::alarm(clock_limit);
+}
+
 void set_signals() {
   static char stack[1 << 16];  // for what overflows its own
   const stack_t other{stack, 0, sizeof stack};
@@ -55,12 +69,13 @@ void set_signals() {
   const auto set = [](std::initializer_list<int> signals, void (*handler)(int)) {
     struct sigaction action {};
     action.sa_handler = handler;
-    action.sa_flags = SA_ONSTACK;
+    action.sa_flags = SA_ONSTACK | SA_RESTART;
     for (const int signal : signals) ::sigaction(signal, &action, nullptr);
   };
   set({SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGUSR1, SIGUSR2, SIGPIPE}, SIG_IGN);
   set({SIGSEGV, SIGBUS, SIGFPE, SIGABRT, SIGILL}, on_crash);
-  set({SIGXCPU, SIGALRM}, on_time);
+  set({SIGXCPU}, on_time);
+  set({SIGALRM}, on_alarm);
   sigset_t none;
   sigemptyset(&none);
   ::pthread_sigmask(SIG_SETMASK, &none, nullptr);
@@ -88,6 +103,7 @@ void set_limits(const ChildLimits& limits) {
   bound(RLIMIT_CPU, limits.seconds, limits.seconds + 1);  // SIGXCPU first, then SIGKILL
   if (const rlim_t used = address_space(); used > 0)
     bound(RLIMIT_AS, used + limits.memory, used + limits.memory);
+  clock_limit = limits.clock;
   ::alarm(limits.clock);
 }
 

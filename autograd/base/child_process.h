@@ -10,9 +10,11 @@ namespace restage {
 
 /// What a child may take.
 struct ChildLimits {
-  uint64_t memory;                ///< bytes of address space, on top of what this process has
-  unsigned seconds;               ///< of processor time
-  unsigned clock = 10 * seconds;  ///< seconds by the clock
+  uint64_t memory;   ///< bytes of address space, on top of what this process has
+  unsigned seconds;  ///< of processor time
+  /// Seconds by the clock in which it hardly works: it waits for something. Who works slowly, since
+  /// the machine is busy, goes on.
+  unsigned clock = 10 * seconds;
 };
 
 struct ChildResult {

@@ -54,8 +54,11 @@ void handle_signals() {
   action.sa_handler = on_signal;
   sigemptyset(&action.sa_mask);
   action.sa_flags = SA_RESTART;
-  sigaction(SIGINT, &action, nullptr);
-  sigaction(SIGTERM, &action, nullptr);
+  for (const int one : {SIGINT, SIGTERM, SIGUSR1, SIGUSR2}) sigaction(one, &action, nullptr);
+  // Under nohup a terminal that closes ends nothing.
+  struct sigaction inherited {};
+  sigaction(SIGHUP, nullptr, &inherited);
+  if (inherited.sa_handler != SIG_IGN) sigaction(SIGHUP, &action, nullptr);
   signal(SIGPIPE, SIG_IGN);
   signal(SIGCHLD, SIG_DFL);  // a caller that ignores it hands that on: nobody would hear of trials
   signal(SIGXFSZ, SIG_IGN);  // a file that may not grow: writing fails, and is cleaned up after

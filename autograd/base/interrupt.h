@@ -1,6 +1,7 @@
-// SIGINT and SIGTERM. By default they end the program at once with exit code 130 or 143, and files
-// that it was writing are removed (temporary.h); inside a StopScope they only set a flag, so that a
-// training run can write a checkpoint first.
+// Signals that end a program: SIGINT and SIGTERM, SIGHUP (a terminal closes), SIGUSR1 and SIGUSR2
+// (what schedulers send before time is up). By default they end the program at once with exit code
+// 128 + signal (130, 143 ...), and files that it was writing are removed (temporary.h); inside a
+// StopScope they only set a flag, so that a training run can write a checkpoint first.
 #pragma once
 
 #include <functional>
@@ -9,7 +10,7 @@
 
 namespace restage {
 
-/// The program was asked to stop; exit_code is 130 or 143.
+/// The program was asked to stop; exit_code is 128 + signal.
 class Interrupted : public Error {
  public:
   explicit Interrupted(int signal)

@@ -37,6 +37,16 @@ class Registry {
         throw Error("the " + kind_ + " '" + entry.*key + "' has been registered already");
     entries_.push_back(std::move(entry));
   }
+  /// Adds an entry, or puts it in the place of one of that name where may_go(that one); else Error.
+  template <class MayGo>
+  void put(T entry, const MayGo& may_go) {
+    for (T& known : entries_)
+      if (known.*key == entry.*key && may_go(known)) {
+        known = std::move(entry);
+        return;
+      }
+    add(std::move(entry));
+  }
   /// The entry of that name. InputError if there is none; `where`: the file in which the name
   /// stands.
   const T& get(const std::string& name, const std::string& where = "") const {

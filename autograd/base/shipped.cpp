@@ -46,7 +46,21 @@ std::string beside_module() {
   return kMissing;
 }
 
+std::vector<std::string>& words_that_were_set() {
+  static std::vector<std::string> words;
+  return words;
+}
+
 }  // namespace
+
+void set_program_to_start(std::vector<std::string> words) {
+  words_that_were_set() = std::move(words);
+}
+
+std::vector<std::string> words_to_start() {
+  const std::vector<std::string>& set = words_that_were_set();
+  return set.empty() ? std::vector{program_to_start()} : set;
+}
 
 std::string program_to_start() {
   const std::string module = beside_module(), by = launcher();

@@ -3,12 +3,18 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 namespace restage {
 
 /// A path that starts the running program again, also after its file was replaced; from Python the
 /// program beside the module. WorkError if there is none.
 std::string program_to_start();
+/// The same with the words that come before the program's arguments: one, or those of
+/// set_program_to_start().
+std::vector<std::string> words_to_start();
+/// Starts the program by these words from now on, such as python3 -m restage.
+void set_program_to_start(std::vector<std::string> words);
 /// The program's own file, absolute; empty if the system does not tell.
 std::string own_program();
 

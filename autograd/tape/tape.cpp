@@ -6,6 +6,7 @@
 #include <unordered_set>
 #include <utility>
 
+#include "autograd/base/op_watch.h"
 #include "autograd/base/words.h"
 #include "autograd/kernels/elementwise.h"
 #include "autograd/kernels/update.h"
@@ -274,6 +275,7 @@ Gradients Tape::backward(const Var& loss, const Tensor& gradient) {
       result.set(node.id, to_write(std::move(gy[0])));
       continue;
     }
+    const BackwardPath path(node.path);
     const OpScope running(node.name());
     const bool alone = node.inputs.size() == 1 && node.inputs[0] >= 0;
     Tensor* total = alone ? &grads[at(node.inputs[0])] : nullptr;

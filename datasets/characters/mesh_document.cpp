@@ -13,6 +13,7 @@
 #include "datasets/readers/clouds/mesh_parsers.h"
 #include "datasets/readers/clouds/obj_lines.h"
 #include "datasets/readers/gltf/gltf_detail.h"
+#include "datasets/readers/text/text.h"
 #include "nn/geometry/glb_file.h"
 #include "nn/geometry/normals.h"
 
@@ -158,7 +159,8 @@ class ObjReader {
     for (const std::string& name : all) {
       if (found && &name == &all.front()) break;
       try {
-        read_materials(gltf::read_neighbour(plain(name), path_), look_);
+        const std::string content = gltf::read_neighbour(plain(name), path_);
+        read_materials(text::without_mark(content, name), look_);
         found = true;
         if (&name == &all.front()) break;
       } catch (const InputError&) {

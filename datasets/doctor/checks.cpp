@@ -117,7 +117,10 @@ void check_source(const std::vector<Mesh>& first_frames, const std::string& wher
       check_take(take, where, d.orientation.up, f, given);
       continue;
     }
-    refuse(where, f, "restage doctor --fix OUT mends it");
+    refuse(where, f,
+           f.topic == "others"
+               ? "--person N of retarget and stream chooses one; restage doctor --fix OUT mends it"
+               : "restage doctor --fix OUT mends it");
   }
 }
 
@@ -179,7 +182,8 @@ void SourceWatch::judge() {
                                  : f.topic == "plane" ? "a floor or a wall is"
                                                       : "a second person is") +
                      " in the clouds before";
-      fix_ = "let one person alone be in the clouds (restage doctor --fix mends recorded ones)";
+      fix_ = cat("let one person alone be in the clouds (restage doctor --fix mends recorded ones",
+                 f.topic == "others" ? "; --person N of retarget and stream chooses one)" : ")");
       settled_ = false;
     }
   }

@@ -64,6 +64,11 @@ Diagnosis doctor_detail::judge_surface(const Mesh& mesh, const PersonShape& shap
   d.fewest_points = d.most_points = mesh.vertices.size();
   judge_points(d, mesh.vertices.size() - equal);
   if (mesh.faces.empty()) judge_path(d, mesh.vertices);
+  if (mesh.faces.empty() && !options.target)
+    judge_sparse(d,
+                 static_cast<size_t>(
+                     std::count(shape.parts.part.begin(), shape.parts.part.end(), Part::person)),
+                 false);
   Seen seen;
   seen.vote.add(shape.points);
   seen.size = shape.size;

@@ -33,6 +33,8 @@ void judge_facing(Diagnosis& d, const ExamineOptions& options);
 /// view.
 void judge_frame(Diagnosis& d, double lowest, double highest, const std::vector<FlatPlane>& planes);
 void judge_points(Diagnosis& d, size_t distinct);
+/// Of clouds: whether a person's points (of many frames the median) are too few for the confidence.
+void judge_sparse(Diagnosis& d, size_t points, bool many);
 /// Of one cloud: whether it is the path of one point.
 void judge_path(Diagnosis& d, const Points& points);
 /// Scale and axes are of no consequence but for the up axis; a target must be in T-pose.

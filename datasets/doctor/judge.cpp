@@ -6,6 +6,7 @@
 #include "datasets/doctor/pose.h"
 #include "datasets/doctor/words.h"
 #include "datasets/readers/clouds/point_path.h"
+#include "nn/models/extraction.h"
 
 namespace restage {
 
@@ -238,6 +239,17 @@ void judge_points(Diagnosis& d, size_t distinct) {
          "scan it more finely"});
 }
 
+void judge_sparse(Diagnosis& d, size_t points, bool many) {
+  if (points >= kEnoughToTrust || points < kEnoughPoints) return;
+  d.say(
+      {"sparse", Weight::note,
+       cat(points, " points show the person", many ? " in a frame (median)" : "",
+           ": too few for the confidence, which then promises too much"),
+       1,
+       cat("counted; of clouds that show one side it can be trusted from ", kEnoughToTrust, " on"),
+       "come nearer, or join what several scanners see"});
+}
+
 void judge_path(Diagnosis& d, const Points& points) {
   if (!is_path(points)) return;
   d.say(
@@ -271,7 +283,13 @@ void judge_parts(Diagnosis& d, const PersonShape& shape, const std::string& wher
   if (parts.other > 0) {
     const auto person = static_cast<double>(shape.points.size());
     const bool somebody = static_cast<double>(parts.largest_other) > 0.4 * person;
-    Finding f{"others", somebody ? Weight::wrong : Weight::note, "", 0.9, "", "{fix} removes it"};
+    Finding f{"others",
+              somebody ? Weight::wrong : Weight::note,
+              "",
+              0.9,
+              "",
+              somebody ? "{fix} removes it; retarget --person N follows one of them"
+                       : "{fix} removes it"};
     f.what = (somebody ? "a second person" : "part of somebody or something else") +
              (" (" + counted(parts.other, "point")) + ")" + where;
     f.evidence = "a separate piece, " + number(parts.gap * metres) +

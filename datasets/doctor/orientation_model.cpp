@@ -9,6 +9,7 @@
 #include <string>
 
 #include "datasets/doctor/shape.h"
+#include "datasets/embedded_weights.h"
 #include "nn/weights/state.h"
 
 namespace restage::doctor_detail {
@@ -92,7 +93,7 @@ const OrientationNet& orientation_net() {
   static const auto net = [] {
     auto out = std::make_unique<OrientationNet>(Init{});
     const std::string where = "the doctor's built-in network";
-    load_state(*out, parse_safetensors(orientation_weights(), where), "", where);
+    load_state(*out, parse_safetensors(embedded::orientation_weights(), where), "", where);
     return out;
   }();
   return *net;

@@ -43,8 +43,6 @@ struct OrientationNet : Module {
   const char* kind() const override { return "OrientationNet"; }
   ReluChain layers;
 };
-/// The bytes of orientation.safetensors.
-std::string_view orientation_weights();
 /// With the weights that are part of the program.
 const OrientationNet& orientation_net();
 

@@ -51,6 +51,8 @@ class Sequence {
         static_cast<double>(strays_) / static_cast<double>(std::max<size_t>(points_, 1));
     recognise(d_, seen_, options_);
     judge_points(d_, fewest_distinct_);
+    if (d_.faces == 0 && !options_.target)
+      judge_sparse(d_, static_cast<size_t>(median(person_points_)), true);
     if (!judge_sizes()) d_.unit.sure = 0;
     judge_units(d_, false);
     judge_up(d_, seen_, options_, looked_);
@@ -109,6 +111,8 @@ class Sequence {
     const PersonShape shape = shape_of({frame.points, frame.faces});
     seen_.vote.add(shape.points, index < kFacingFrames);
     sizes_.push_back(shape.size);
+    person_points_.push_back(static_cast<double>(
+        std::count(shape.parts.part.begin(), shape.parts.part.end(), Part::person)));
     at_.push_back(index);
     std::array<double, 12> ends;
     for (int i = 0; i < 6; ++i) {
@@ -358,7 +362,8 @@ class Sequence {
       if (frames_[i].sequence == frames_[i - 1].sequence && !d_.repeated.contains(i))
         speeds.push_back((frames_[i].middle - frames_[i - 1].middle).norm() * metres() * d_.fps);
     Finding f{"frame rate", Weight::fact, number(d_.fps) + " frames a second", 1, "", ""};
-    if (speeds.size() < 5 || d_.unit.sure < kUnsure) {
+    const bool alone = 4 * other_frames_ < looked_;  // else it is now one person, now another
+    if (speeds.size() < 5 || d_.unit.sure < kUnsure || !alone) {
       f.evidence = options_.fps ? "as given" : "the file's, or 30 where it says none";
       d_.say(f);
       return;
@@ -382,6 +387,7 @@ class Sequence {
   std::vector<Summary> frames_;
   Seen seen_;
   std::vector<double> sizes_;  // of the person alone, of frames at_
+  std::vector<double> person_points_;
   std::vector<int64_t> at_;
   std::vector<std::array<double, 12>> ends_;  // lowest and highest along each direction
   size_t looked_ = 0, fewest_distinct_ = SIZE_MAX, points_ = 0, repeats_ = 0, repeat_frames_ = 0;

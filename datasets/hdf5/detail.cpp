@@ -1,6 +1,7 @@
 #include "datasets/hdf5/detail.h"
 
 #include <algorithm>
+#include <array>
 #include <cstdlib>
 #include <cstring>
 #include <initializer_list>
@@ -87,8 +88,21 @@ bool is_wide_integer(hid_t type) {
                           H5T_STD_U32BE});
 }
 
+/// What h5py makes of truth values: an enumeration of 0 and 1 in one byte.
+bool is_truth(hid_t type) {
+  if (H5Tget_class(type) != H5T_ENUM || H5Tget_size(type) != 1 || H5Tget_nmembers(type) != 2)
+    return false;
+  const Handle base(H5Tget_super(type), H5Tclose);
+  if (!is_one_of(base, {H5T_STD_I8LE, H5T_STD_U8LE})) return false;
+  std::array<uint8_t, 2> values{};
+  for (unsigned i = 0; i < 2; ++i)
+    if (H5Tget_member_value(type, i, &values[i]) < 0) return false;
+  return values == std::array<uint8_t, 2>{0, 1} || values == std::array<uint8_t, 2>{1, 0};
+}
+
 Type classify(hid_t type, const std::string& where) {
   const H5T_class_t kind = H5Tget_class(type);
+  if (is_truth(type)) return Type::integer;
   if (kind == H5T_STRING) return Type::text;
   if (kind == H5T_FLOAT &&
       (is_one_of(type, {H5T_IEEE_F32LE, H5T_IEEE_F32BE, H5T_IEEE_F64LE, H5T_IEEE_F64BE}) ||

@@ -11,6 +11,8 @@
 #include "datasets/importers/bodies/makehuman.h"
 #include "datasets/importers/import_detail.h"
 #include "datasets/importers/motions/cmu.h"
+#include "datasets/importers/motions/estimated.h"
+#include "datasets/readers/arrays/nested_file.h"
 #include "datasets/readers/clouds/mesh_io.h"
 #include "datasets/readers/errors.h"
 #include "datasets/readers/foreign_kinds.h"
@@ -71,7 +73,10 @@ ImportSummary import_folder(const std::string& source, const std::string& out,
   const bool clips = fs::exists(source + "/cmu/clips30.h5", ignored);
   if (bodies || clips) return import_data_folder(source, bodies, clips, out, options);
   const std::vector<std::string> recordings = files_below(source, is_recording_name);
-  if (recordings.empty()) return import_array_folder(source, out, options);
+  if (recordings.empty() && holds_joints(source, options))
+    return import_joints(source, out, options);
+  if (recordings.empty() || are_bare_surfaces(recordings))
+    return import_array_folder(source, out, options);
   ImportSummary summary = import_recordings(recordings, source, out, options);
   count_ignored(
       source,
@@ -84,11 +89,17 @@ ImportSummary import_folder(const std::string& source, const std::string& out,
 
 ImportSummary import_file(const std::string& source, const std::string& out,
                           const ImportOptions& options) {
+  if (may_hold_estimates(source) && !is_npz_name(source))
+    return holds_joints(source, options) ? import_joints(source, out, options)
+                                         : import_array_file(source, out, options);
   refuse_foreign_content(source);
-  if (is_recording_name(source)) return import_recordings({source}, source, out, options);
+  if (is_recording_name(source) && !are_bare_surfaces({source}))
+    return import_recordings({source}, source, out, options);
+  const bool estimated = options.motion.layout.empty() && is_npz_name(source) &&
+                         holds_estimates(source, options.max_memory);
+  if (!estimated && holds_joints(source, options)) return import_joints(source, out, options);
   if (is_hdf5(source) && is_packed_clips(source)) return import_packed_clips(source, out, options);
   if (holds_scans(source)) return import_array_file(source, out, options);
-  if (is_pickle_name(source)) refuse_pickle(source);
   if (source.ends_with(".asf") || source.ends_with(".asf.xz"))
     throw InputError(source, "is a skeleton without a motion",
                      "give an .amc file and this one with {asf}");
@@ -117,7 +128,8 @@ std::vector<std::string> inputs_of(const std::string& source, const ImportOption
   std::error_code ignored;
   if (fs::is_directory(options.body_model, ignored))
     out = files_below(options.body_model, is_npz_name);
-  for (const std::string& path : {source, options.asf, options.motion.profile, options.body_model})
+  for (const std::string& path :
+       {source, options.asf, options.motion.profile, options.body_model, options.intrinsics})
     out.push_back(path);
   return out;
 }
@@ -221,22 +233,20 @@ void count_ignored(const std::string& folder, bool (*considered)(const std::stri
 }
 
 bool holds_scans(const std::string& path) {
-  return is_array_name(path) || is_mesh_name(path) || is_cloud_name(path) || is_text_name(path) ||
-         is_hdf5(path);
+  return is_array_name(path) || is_mesh_name(path) || is_cloud_name(path) ||
+         may_be_cloud_name(path) || is_hdf5(path);
 }
 
-bool is_pickle_name(const std::string& path) { return path.ends_with(".pkl"); }
-
 void refuse_pickle(const std::string& path) {
-  throw InputError(path, "is a pickle, which can run code and is never read",
+  throw InputError(path, "is a body model in a pickle, which needs to run code and is never read",
                    "convert it to plain arrays (docs/formats.md shows how)");
 }
 
 bool is_importable(const std::string& source) {
   std::error_code ignored;
   return fs::is_directory(source, ignored) || is_recording_name(source) || is_array_name(source) ||
-         is_mesh_name(source) || is_cloud_name(source) ||
-         (is_text_name(source) && fs::exists(source, ignored) && is_table_of_points(source));
+         is_mesh_name(source) || is_cloud_name(source) || is_pickle_name(source) ||
+         (may_be_cloud_name(source) && fs::exists(source, ignored) && is_cloud_by_content(source));
 }
 
 ImportSummary import_data(const std::string& source, const std::string& out,
@@ -247,6 +257,7 @@ ImportSummary import_data(const std::string& source, const std::string& out,
     throw InputError(source, source.empty() ? "SOURCE is empty" : "is not there",
                      "give a file or a folder");
   check_output(out, inputs_of(source, options));
+  if (is_depth_source(source, options)) return import_depth(source, out, options);
   return fs::is_directory(source, ignored) ? import_folder(source, out, options)
                                            : import_file(source, out, options);
 }

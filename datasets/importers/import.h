@@ -24,8 +24,15 @@ struct ImportOptions {
   /// moves; empty: as each kind of file has it.
   std::string subjects;
   std::string body_model;  ///< a SMPL, SMPL-H or SMPL-X model or a folder; AMASS needs it
+  /// Of a file with several people's motions this one; empty: all.
+  std::string person;
   /// For a body model as source: files of betas (read_betas), or "zeros" for the mean person.
   std::vector<std::string> betas;
+  /// Of depth pictures: the camera's numbers or a file of them (read_intrinsics()); empty: the
+  /// file's own.
+  std::string intrinsics;
+  double depth_scale = 0;            ///< metres a unit of depth; 0: by the kind of number
+  bool keep_background = false;      ///< floors, walls and furniture too
   uint64_t max_memory = kMaxMemory;  ///< what unpacking one array may take
 };
 
@@ -53,7 +60,10 @@ bool is_importable(const std::string& source);
 /// - a rigged character (.glb, .gltf, .vrm, .fbx): its body and its animations (gltf_character.h);
 /// - a tree of folders of recordings and characters, in the order of their names;
 /// - an AMASS motion (.npz) or a tree of folders of them, subjects named by folder (amass.h);
+/// - what a pose estimator writes (.npz, .npy, .pkl, .pt ...): a motion of each person
+///   (estimated.h);
 /// - a body model (.npz), giving bodies (smpl.h);
+/// - pictures of a depth camera (PNG, NPZ, NPY; depth_frames.h): clouds of the person;
 /// - scans: an array, HDF5, mesh or cloud file, or a tree of folders of them (scans.h).
 /// An option that a kind of input does not take is an InputError, never ignored.
 /// Unusable files of a folder are skipped and listed, and so is a scan sequence of a tree with a

@@ -1,13 +1,17 @@
 // import_data() of arrays and scans: AMASS motions, body models, clouds.
 #include <algorithm>
 #include <filesystem>
+#include <iterator>
+#include <optional>
 
 #include "autograd/base/output_check.h"
+#include "datasets/builtin/body_shape.h"
 #include "datasets/importers/bodies/smpl.h"
 #include "datasets/importers/import_detail.h"
-#include "datasets/importers/motions/amass.h"
+#include "datasets/importers/motions/estimated.h"
 #include "datasets/importers/scans.h"
 #include "datasets/readers/arrays/body_parameters.h"
+#include "datasets/readers/arrays/nested_file.h"
 #include "datasets/readers/clouds/mesh_io.h"
 #include "datasets/readers/errors.h"
 #include "datasets/readers/foreign_kinds.h"
@@ -18,12 +22,6 @@ namespace restage {
 namespace {
 
 namespace fs = std::filesystem;
-
-void check_fps(const ImportOptions& options) {
-  const double fps = options.motion.fps;
-  if (fps != 0 && !(fps >= 1 && fps <= 2000))
-    throw InputError("", "{fps} is out of range", "give frames per second, 1 to 2000");
-}
 
 // ---- AMASS -------------------------------------------------------------------------------------
 
@@ -42,39 +40,87 @@ MotionOptions amass_options(const fs::path& file, const fs::path& root,
   return out;
 }
 
+/// The skeleton that estimated motions are done by: the user's body model's, else the average
+/// built-in body's. Archives laid out as AMASS's are training data of true people: they need it.
+class Skeletons {
+ public:
+  explicit Skeletons(const ImportOptions& options) {
+    if (!options.body_model.empty()) models_.emplace(options.body_model, options.max_memory);
+  }
+  Motion import(const EstimatedMotion& from, const MotionOptions& how, ImportReport& report) {
+    if (models_) return import_amass(*from.arrays, *models_, how, report, nullptr, from.hints);
+    if (from.plain) refuse_without_model(from.arrays->path());
+    return import_amass(*from.arrays, shape_joints({}), how, report, nullptr, from.hints);
+  }
+  [[noreturn]] static void refuse_without_model(const std::string& where) {
+    throw InputError(where,
+                     "holds motions of a body model (as AMASS does), whose skeletons are in the "
+                     "model's own file",
+                     "give your SMPL, SMPL-H or SMPL-X model with {body-model} MODEL.npz");
+  }
+
+ private:
+  std::optional<BodyModels> models_;
+};
+
+std::vector<EstimatedMotion> wanted_people(const std::string& path, const ImportOptions& options) {
+  std::vector<EstimatedMotion> all = read_estimated(path, options.max_memory);
+  if (options.person.empty() || all.empty()) return all;
+  return {one_person(std::move(all), options.person, path)};
+}
+
+/// All motions of a file.
+void add_motions(const std::string& path, const MotionOptions& how, const ImportOptions& options,
+                 Skeletons& skeletons, ImportWriter& writer, ImportSummary& summary) {
+  const std::vector<EstimatedMotion> people = wanted_people(path, options);
+  std::vector<Motion> motions;
+  std::vector<ImportReport> reports;
+  for (const EstimatedMotion& from : people) {
+    ImportReport report;
+    if (!from.person.empty()) report.fact("person", from.person);
+    if (!from.place.empty()) report.fact("found in", from.place);
+    MotionOptions one = how;
+    if (people.size() > 1) {
+      one.id += "_" + from.person;
+      one.subject += "_" + from.person;
+    }
+    motions.push_back(skeletons.import(from, one, report));
+    reports.push_back(std::move(report));
+  }
+  if (motions.empty())
+    throw InputError(path, "holds no motion (it has " + list_of(Npz(path).names()) + ")",
+                     "AMASS motions have poses and trans");
+  writer.add(path, {}, motions);
+  std::move(reports.begin(), reports.end(), std::back_inserter(summary.reports));
+}
+
 ImportSummary import_amass_files(const std::vector<std::string>& files, const std::string& source,
                                  const std::string& root, const std::string& out,
                                  const ImportOptions& options) {
   check_options({InputKind::amass}, source, options);
-  if (options.body_model.empty())
-    throw InputError(source,
-                     "holds motions of a body model (as AMASS does), whose skeletons are in the "
-                     "model's own file",
-                     "give your SMPL, SMPL-H or SMPL-X model with {body-model} MODEL.npz");
   check_fps(options);
   check_output(out, files);
-  BodyModels models(options.body_model, options.max_memory);
+  if (files.size() == 1) wanted_people(files[0], options);  // what is wrong here is said first
+  Skeletons skeletons(options);
   FileInfo info = file_info(source, options);
-  info.provenance +=
-      " (AMASS), skeletons of " + absolute_path(options.body_model).filename().string();
+  if (!options.body_model.empty())
+    info.provenance +=
+        " (AMASS), skeletons of " + absolute_path(options.body_model).filename().string();
   ImportSummary summary;
   ImportWriter writer(out, info, summary);
   const std::map<std::string, std::string> people = subjects_of(files, root, options.subjects);
   add_each(files, summary, [&](const std::string& path) {
-    const Npz file(path, options.max_memory);
-    if (is_amass_shape(file)) {
-      ++summary.shapes;
-      return;
+    if (is_npz_name(path)) {
+      const Npz file(path, options.max_memory);
+      if (is_amass_shape(file)) {
+        ++summary.shapes;
+        return;
+      }
+      if (!named_cloud(file)) refuse_incomplete(file, body_parameters(file));
     }
-    if (!named_cloud(file)) refuse_incomplete(file, body_parameters(file));
-    if (!is_amass_motion(file))
-      throw InputError(path, "holds no motion (it has " + list_of(file.names()) + ")",
-                       "AMASS motions have poses and trans");
-    ImportReport report;
     MotionOptions how = amass_options(path, root, options);
     if (const auto who = people.find(path); who != people.end()) how.subject = who->second;
-    writer.add(path, {}, {import_amass(file, models, how, report)});
-    summary.reports.push_back(std::move(report));
+    add_motions(path, how, options, skeletons, writer, summary);
   });
   check_any(summary, source);
   writer.commit();
@@ -175,7 +221,8 @@ ImportSummary import_npz(const std::string& source, const std::string& out,
   if (is_smpl_model(file)) return import_model(source, out, options);
   if (!options.betas.empty())
     throw InputError(source, "is no body model, to which {betas} belongs", "leave {betas} out");
-  if (is_amass_motion(file)) return import_amass_files({source}, source, folder, out, options);
+  if (holds_estimates(source, options.max_memory))
+    return import_amass_files({source}, source, folder, out, options);
   if (is_amass_shape(file))
     throw InputError(source, "holds a body's shape and no motion",
                      "import the body model and give this file as {betas}");
@@ -187,26 +234,34 @@ ImportSummary import_npz(const std::string& source, const std::string& out,
 
 ImportSummary import_array_file(const std::string& source, const std::string& out,
                                 const ImportOptions& options) {
-  return is_npz_name(source) ? import_npz(source, out, options)
-                             : import_scan_files(source, out, options);
+  if (is_npz_name(source)) return import_npz(source, out, options);
+  if (!may_hold_estimates(source)) return import_scan_files(source, out, options);
+  const std::string folder = absolute_path(source).parent_path().string();
+  return import_amass_files({source}, source, folder, out, options);
 }
 
 ImportSummary import_array_folder(const std::string& source, const std::string& out,
                                   const ImportOptions& options) {
-  const std::vector<std::string> npz = files_below(source, is_npz_name);
-  const bool amass = std::any_of(npz.begin(), npz.end(), [&](const std::string& path) {
+  const std::vector<std::string> files = files_below(source, may_hold_estimates);
+  constexpr size_t kTries = 5;  // pickles of a folder without a motion: so are the others
+  std::map<std::string, size_t> tried;
+  const bool amass = std::any_of(files.begin(), files.end(), [&](const std::string& path) {
+    if (is_pickle_name(path) && ++tried[fs::path(path).parent_path().string()] > kTries)
+      return false;
     try {
-      return is_amass_motion(Npz(path, options.max_memory));
+      return is_npz_name(path) ? holds_estimates(path, options.max_memory)
+                               : !read_estimated(path, options.max_memory).empty();
     } catch (const InputError&) {
       return false;  // one that is damaged is named when its turn comes
     }
   });
-  ImportSummary summary = amass ? import_amass_files(npz, source, source, out, options)
+  ImportSummary summary = amass ? import_amass_files(files, source, source, out, options)
                                 : import_scan_files(source, out, options);
   const auto of_scans = [](const std::string& path) {
-    return (holds_scans(path) && !is_text_name(path)) || path.ends_with(".pkl");
+    return may_be_cloud_name(path) ? is_cloud_by_content(path)
+                                   : holds_scans(path) || is_pickle_name(path);
   };
-  count_ignored(source, amass ? is_npz_name : of_scans, summary);
+  count_ignored(source, amass ? may_hold_estimates : of_scans, summary);
   return summary;
 }
 

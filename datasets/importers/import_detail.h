@@ -17,10 +17,23 @@ std::filesystem::path absolute_path(const std::filesystem::path& path);
 /// Licence as given, provenance by the source's name.
 FileInfo file_info(const std::string& source, const ImportOptions& options);
 
-enum class InputKind { data_folder, packed_clips, bvh, amc, character, amass, body_model, scans };
+enum class InputKind {
+  data_folder,
+  packed_clips,
+  bvh,
+  amc,
+  character,
+  amass,
+  joints,
+  body_model,
+  scans,
+  depth
+};
 /// InputError for an option that none of these kinds takes: none is ignored without a word.
 void check_options(const std::set<InputKind>& kinds, const std::string& source,
                    const ImportOptions& options);
+/// InputError for an fps that no recording has.
+void check_fps(const ImportOptions& options);
 /// Counts the files below the folder that are not `considered`, by the ends of their names.
 void count_ignored(const std::string& folder, bool (*considered)(const std::string&),
                    ImportSummary& summary);
@@ -44,7 +57,7 @@ class ImportWriter {
 
 /// Whether a file may hold scans, by its name.
 bool holds_scans(const std::string& path);
-bool is_pickle_name(const std::string& path);
+/// InputError for a body model in a pickle.
 [[noreturn]] void refuse_pickle(const std::string& path);
 
 /// InputError for several files, with the reason and the remedy of the first.
@@ -65,6 +78,8 @@ std::map<std::string, std::string> subjects_of(const std::vector<std::string>& f
 
 /// BVH, AMC and glTF files (import_recordings.cpp).
 bool is_recording_name(const std::string& path);
+/// Whether these are glTF files without any skeleton or animation: points alone, or a mesh a frame.
+bool are_bare_surfaces(const std::vector<std::string>& files);
 ImportSummary import_recordings(const std::vector<std::string>& files, const std::string& source,
                                 const std::string& out, const ImportOptions& options);
 
@@ -74,5 +89,17 @@ ImportSummary import_array_file(const std::string& source, const std::string& ou
                                 const ImportOptions& options);
 ImportSummary import_array_folder(const std::string& source, const std::string& out,
                                   const ImportOptions& options);
+
+/// Positions of joints (import_joints.cpp): whether a file, or the first array of a folder, holds
+/// them, and the motions that they are.
+bool holds_joints(const std::string& source, const ImportOptions& options);
+ImportSummary import_joints(const std::string& source, const std::string& out,
+                            const ImportOptions& options);
+
+/// Pictures of a depth camera (import_depth.cpp): whether the source holds them, or the options say
+/// so, and the clouds that they are.
+bool is_depth_source(const std::string& source, const ImportOptions& options);
+ImportSummary import_depth(const std::string& source, const std::string& out,
+                           const ImportOptions& options);
 
 }  // namespace restage

@@ -21,24 +21,27 @@ std::vector<Given> all_of(const ImportOptions& options) {
   using enum InputKind;
   const MotionOptions& motion = options.motion;
   const Kinds recordings = {bvh, amc}, moving = {bvh, amc, character},
-              motions = {bvh, amc, character, amass},
-              bodies = {bvh, amc, character, amass, body_model},
-              files = {bvh, amc, character, amass, body_model, scans},
-              scaled = {bvh, amc, character, amass, scans}, timed = {bvh, amc, amass, scans},
-              turned = {bvh, amc, character, amass, scans};
+              motions = {bvh, amc, character, amass, joints},
+              bodies = {bvh, amc, character, amass, joints, body_model},
+              files = {bvh, amc, character, amass, joints, body_model, scans, depth},
+              scaled = {bvh, amc, character, amass, joints, scans},
+              timed = {bvh, amc, amass, joints, scans, depth},
+              turned = {bvh, amc, character, amass, joints, scans};
   const char *of_recordings = "BVH and AMC recordings",
              *of_moving = "recordings and glTF characters",
-             *of_scaled = "recordings, glTF characters, AMASS motions and scans",
-             *of_timed = "recordings, AMASS motions and scans (glTF files state their key times)",
-             *of_turned = "recordings, characters, AMASS motions and scans";
+             *of_scaled = "recordings, glTF characters, AMASS motions, joints and scans",
+             *of_timed =
+                 "recordings, AMASS motions, joints and scans (glTF files state their key times)",
+             *of_turned = "recordings, characters, AMASS motions, joints and scans";
   const ImportOptions none;
   const RestOptions& rest = motion.rest;
   return {
       {"{license}", options.license != none.license, files, "files whose licence is not known"},
-      {"{subject}", !motion.subject.empty(), motions, "recordings, characters and AMASS motions"},
+      {"{subject}", !motion.subject.empty(), motions,
+       "recordings, characters, AMASS motions and joints"},
       {"{subjects}", !options.subjects.empty(), motions, "motions"},
       {"{split}", motion.split != none.motion.split, bodies,
-       "recordings, characters, AMASS motions and body models"},
+       "recordings, characters, AMASS motions, joints and body models"},
       {"{scale}", motion.scale > 0, scaled, of_scaled},
       {"{fps}", motion.fps > 0, timed, of_timed},
       {"{up}", rest.up != Axis::automatic, turned, of_turned},
@@ -46,11 +49,16 @@ std::vector<Given> all_of(const ImportOptions& options) {
       {"{rest-frame}", rest.frame >= 0, recordings, of_recordings},
       {"{drop-leading}", motion.drop_leading >= 0, recordings, of_recordings},
       {"{bones}", !motion.profile.empty(), moving, of_moving},
+      {"{layout}", !motion.layout.empty(), {joints}, "joints without rotations"},
       {"{asf}", !options.asf.empty(), {amc}, "AMC recordings"},
       {"{clip}", !options.clip.empty(), {character}, "glTF characters"},
       {"{body-model}", !options.body_model.empty(), {amass}, "AMASS motions"},
+      {"{person}", !options.person.empty(), {amass, joints}, "pose estimators' files and joints"},
       {"{betas}", !options.betas.empty(), {body_model}, "body models"},
       {"{without}", !options.without.empty(), {packed_clips}, "packed clips"},
+      {"{intrinsics}", !options.intrinsics.empty(), {depth}, "depth pictures"},
+      {"{depth-scale}", options.depth_scale > 0, {depth}, "depth pictures"},
+      {"{keep-background}", options.keep_background, {depth}, "depth pictures"},
       {"{garment}", !options.garment.empty(), {data_folder}, "data folders"},
   };
 }
@@ -66,6 +74,12 @@ void check_options(const Kinds& kinds, const std::string& source, const ImportOp
                        cat("has nothing to do with ", one.option, ", which is for ", one.whose),
                        cat("leave ", one.option, " out"));
   }
+}
+
+void check_fps(const ImportOptions& options) {
+  const double fps = options.motion.fps;
+  if (fps != 0 && !(fps >= 1 && fps <= 2000))
+    throw InputError("", "{fps} is out of range", "give frames per second, 1 to 2000");
 }
 
 std::map<std::string, std::string> subjects_of(const std::vector<std::string>& files,

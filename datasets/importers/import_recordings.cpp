@@ -76,6 +76,21 @@ bool is_recording_name(const std::string& path) {
   return text::ends_in(path, {".bvh", ".bvh.xz"}) || is_amc_name(path) || is_gltf_name(path);
 }
 
+bool are_bare_surfaces(const std::vector<std::string>& files) {
+  const bool one = files.size() == 1;
+  for (const std::string& path : files) {
+    if (!is_gltf_name(path)) return false;
+    try {
+      const Gltf file = read_gltf(path);
+      const bool bare = file.skin_nodes.empty() && file.clips.empty() && file.humanoid.empty();
+      if (!bare || file.vertices.empty() || (one && !file.faces.empty())) return false;
+    } catch (const InputError&) {
+      return false;
+    }
+  }
+  return !files.empty();
+}
+
 ImportSummary import_recordings(const std::vector<std::string>& files, const std::string& source,
                                 const std::string& out, const ImportOptions& options) {
   // Mistakes in the options are not the files'.

@@ -12,6 +12,7 @@
 #include "datasets/doctor/examine.h"
 #include "datasets/doctor/orientation_model.h"
 #include "datasets/doctor/shape.h"
+#include "datasets/readers/arrays/nested_file.h"
 #include "datasets/readers/clouds/mesh_io.h"
 #include "datasets/readers/clouds/point_path.h"
 #include "datasets/readers/errors.h"
@@ -42,8 +43,16 @@ std::vector<std::string> files_in(const std::string& folder) {
 
 size_t count_pickles(const std::string& folder) {
   const std::vector<std::string> files = files_in(folder);
-  return static_cast<size_t>(std::count_if(
-      files.begin(), files.end(), [](const std::string& file) { return file.ends_with(".pkl"); }));
+  return static_cast<size_t>(std::count_if(files.begin(), files.end(), is_pickle_name));
+}
+
+/// The sequences of a file.
+void add_file(const std::string& file, const FrameOptions& options,
+              std::vector<ScanSequence>& out) {
+  if (!is_hdf5(file) && !is_array_name(file)) return out.push_back({file, file, {}, {}});
+  const int64_t sequences = open_frames(file, options)->sequences();
+  if (sequences == 1) return out.push_back({file, file, {}, {}});
+  for (int64_t s = 0; s < sequences; ++s) out.push_back({cat(file, ":", s), file, s, {}});
 }
 
 /// The arrays of a folder: sequences by themselves, single frames together. Among frames, one that
@@ -60,7 +69,7 @@ void add_arrays(const std::string& folder, const std::vector<std::string>& files
       if (!cloud)
         why[file] = file + ": holds no points";
       else if (cloud->axes.sequence)
-        out.push_back({file, file, {}, {}});
+        add_file(file, {"", max_memory}, out);
       else
         frames.push_back(file);
     } catch (const InputError& error) {
@@ -75,15 +84,6 @@ void add_arrays(const std::string& folder, const std::vector<std::string>& files
   }
   for (const std::string& file : files)
     if (why.count(file) > 0) skipped.push_back(why[file]);
-}
-
-/// The sequences of a file.
-void add_file(const std::string& file, const FrameOptions& options,
-              std::vector<ScanSequence>& out) {
-  if (!is_hdf5(file)) return out.push_back({file, file, {}, {}});
-  const int64_t sequences = open_frames(file, options)->sequences();
-  for (int64_t s = 0; s < sequences; ++s)
-    out.push_back({sequences == 1 ? file : cat(file, ":", s), file, s, {}});
 }
 
 /// What lies in a folder itself.
@@ -175,6 +175,11 @@ std::string rate_fact(double fps, const std::string& from, int64_t frames, const
   for (int64_t k = 1; k < count; ++k) used += clock.source(k) != clock.source(k - 1);
   return cat(before, " -> 30 fps, ", count, " frames (the nearest in time: ", frames - used,
              " left out, ", count - used, " repeated)");
+}
+
+std::string rate_of(double fps, bool given, bool stated, int64_t frames, const Clock& clock) {
+  const char* from = given ? "{fps}" : stated ? "the file's" : "taken for granted: {fps}";
+  return rate_fact(fps, from, frames, clock);
 }
 
 constexpr size_t kFewest = 64;  // different points that retargeting needs
@@ -283,9 +288,57 @@ void check_person(const Frame& frame, double given_scale, ImportReport& report) 
                    "give scans of one person, metres a unit as {scale}, or {force}");
 }
 
+/// By the first file of a sequence that can be read.
+bool shows_camera_axes(const ScanSequence& sequence, uint64_t max_memory) {
+  const std::string& first = !sequence.file.empty()          ? sequence.file
+                             : sequence.frames.files.empty() ? sequence.name
+                                                             : sequence.frames.files[0];
+  try {
+    return is_array_name(first) && is_seen_by_camera(first, max_memory);
+  } catch (const InputError&) {
+    return false;  // who reads the frames says what is wrong
+  }
+}
+
 std::string size_fact(const Points& points) {
   const Point size = box_of(points).sizes();
   return format("%.3g x %.3g x %.3g m in the first frame (x, y, z)", size.x(), size.y(), size.z());
+}
+
+/// Writes the frames at our rate.
+int64_t copy_frames(FrameSource& source, const Clock& clock, const Eigen::Matrix3f& to_ours,
+                    const std::string& name, const MotionOptions& options, ScanWriter& out,
+                    ImportReport& report) {
+  HoldingWriter writer(out, name);
+  Frame frame;
+  bool first = true;
+  size_t left_out = 0, different = 0;
+  std::vector<InputError> faults;
+  int64_t at = 0;  // of the source, the frame that next() gives
+  const int64_t count = clock.count();
+  for (int64_t k = 0; k < count; ++k) {
+    for (; at < clock.source(k); ++at) source.skip();
+    if (at == clock.source(k)) {  // else the frame before, once more
+      frame = *source.next();
+      ++at;
+      left_out += frame.left_out;
+      if (frame.fault) faults.push_back(*frame.fault);
+      different = different_points(frame.points);
+      const bool look = first && different >= kFewest;
+      if (look && !options.force) check_person(frame, options.scale, report);
+      convert(frame, to_ours);
+      if (look) report.fact("size", size_fact(frame.points));
+      first = first && !look;
+    }
+    writer.push(frame, different);
+  }
+  if (left_out > 0)
+    report.remark(
+        cat("left out ", counted(left_out, "point"), " whose coordinates are NaN or infinite"));
+  for (const std::string& remark : source.remarks()) report.remark(remark);
+  if (!faults.empty()) report.remark(remark_on_faults(faults));
+  writer.finish(report);
+  return count;
 }
 
 }  // namespace
@@ -307,8 +360,8 @@ std::vector<ScanSequence> find_scans(const std::string& path, uint64_t max_memor
     if (const size_t n = count_pickles(folder))
       skipped.push_back(
           cat(folder, ": ", n,
-              " pickles (.pkl), which can run code and are never read; docs/formats.md "
-              "shows how to convert them"));
+              " pickles (.pkl), of which only motions of a body model are read; docs/formats.md "
+              "shows how to convert others"));
   }
   const auto by_name = [](const ScanSequence& a, const ScanSequence& b) {
     return natural_less(a.name, b.name);
@@ -323,54 +376,38 @@ int64_t import_scans(const ScanSequence& sequence, const MotionOptions& options,
   const FrameOptions how{"", max_memory, sequence.part};
   const auto source = one ? open_frames(sequence.file, how) : open_frame_list(sequence.frames, how);
   const bool stated =
-      one && ((is_array_name(sequence.file) && stated_fps(sequence.file, max_memory)) ||
-              (is_hdf5(sequence.file) && states_fps(sequence.file)));
+      source->fps() != kFps ||
+      (one && ((is_array_name(sequence.file) && stated_fps(sequence.file, max_memory)) ||
+               (is_hdf5(sequence.file) && states_fps(sequence.file))));
   const double fps = options.fps > 0 ? options.fps : source->fps();
   const double scale = options.scale > 0 ? options.scale : 1;
   const Clock clock(source->frames(), fps);
   report.file = sequence.name;
-  report.fact("rate", rate_fact(fps,
-                                options.fps > 0 ? "{fps}"
-                                : stated        ? "the file's"
-                                                : "taken for granted: {fps}",
-                                source->frames(), clock));
+  report.fact("rate", rate_of(fps, options.fps > 0, stated, source->frames(), clock));
   report.fact("scale", options.scale > 0 ? format("%.6g m a unit ({scale})", scale)
                                          : "metres (taken for granted: {scale})");
   const bool given_up = options.rest.up != Axis::automatic;
-  const Axis up = given_up ? options.rest.up : Axis::y;
-  report.fact("up", to_string(up) + (given_up ? " ({up})" : " (taken for granted: {up})"));
+  const bool camera = !given_up && shows_camera_axes(sequence, max_memory);
+  const Axis up = given_up ? options.rest.up : camera ? Axis::minus_y : Axis::y;
+  report.fact("up", to_string(up) + (given_up ? " ({up})"
+                                     : camera ? " (a camera's axes: {up})"
+                                              : " (taken for granted: {up})"));
+  if (camera)
+    report.remark(
+        "these are vertices as a camera saw them, whose y points down: turned about x by 180 "
+        "degrees ({up} y if they were turned before); the body stays where its vertices are, "
+        "pred_cam_t is not added");
   const Eigen::Matrix3f to_ours = (scale * upright(up)).cast<float>();
 
-  HoldingWriter writer(out, sequence.name);
-  Frame frame;
-  bool first = true;
-  size_t left_out = 0, different = 0;
-  std::vector<InputError> faults;
-  int64_t at = 0;  // of the source, the frame that next() gives
-  const int64_t count = clock.count();
-  for (int64_t k = 0; k < count; ++k) {
-    for (; at < clock.source(k); ++at) source->skip();
-    if (at == clock.source(k)) {  // else the frame before, once more
-      frame = *source->next();
-      ++at;
-      left_out += frame.left_out;
-      if (frame.fault) faults.push_back(*frame.fault);
-      different = different_points(frame.points);
-      const bool look = first && different >= kFewest;
-      if (look && !options.force) check_person(frame, options.scale, report);
-      convert(frame, to_ours);
-      if (look) report.fact("size", size_fact(frame.points));
-      first = first && !look;
-    }
-    writer.push(frame, different);
-  }
-  if (left_out > 0)
-    report.remark(
-        cat("left out ", counted(left_out, "point"), " whose coordinates are NaN or infinite"));
-  for (const std::string& remark : source->remarks()) report.remark(remark);
-  if (!faults.empty()) report.remark(remark_on_faults(faults));
-  writer.finish(report);
-  return count;
+  return copy_frames(*source, clock, to_ours, sequence.name, options, out, report);
+}
+
+int64_t import_frames(FrameSource& source, const std::string& name, const MotionOptions& options,
+                      bool stated, ScanWriter& out, ImportReport& report) {
+  const double fps = options.fps > 0 ? options.fps : source.fps();
+  const Clock clock(source.frames(), fps);
+  report.fact("rate", rate_of(fps, options.fps > 0, stated, source.frames(), clock));
+  return copy_frames(source, clock, Eigen::Matrix3f::Identity(), name, options, out, report);
 }
 
 }  // namespace restage

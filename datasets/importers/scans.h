@@ -8,6 +8,7 @@
 
 #include "datasets/importers/motions/motion_clip.h"
 #include "datasets/readers/byte_stream.h"
+#include "datasets/readers/frames/frame_folder.h"
 #include "datasets/readers/frames/frame_names.h"
 #include "datasets/schema.h"
 
@@ -17,7 +18,7 @@ namespace restage {
 struct ScanSequence {
   std::string name;
   std::string file;             ///< that holds the sequence; empty: `frames` do
-  std::optional<int64_t> part;  ///< which sequence of an HDF5 file
+  std::optional<int64_t> part;  ///< which of the sequences of a file
   FrameList frames;
 };
 
@@ -37,5 +38,9 @@ std::vector<ScanSequence> find_scans(const std::string& path, uint64_t max_memor
 /// drop_sequence().
 int64_t import_scans(const ScanSequence& sequence, const MotionOptions& options,
                      uint64_t max_memory, ScanWriter& out, ImportReport& report);
+
+/// The same of frames that are open, in metres and y up; `stated`: the rate is the file's own.
+int64_t import_frames(FrameSource& source, const std::string& name, const MotionOptions& options,
+                      bool stated, ScanWriter& out, ImportReport& report);
 
 }  // namespace restage

@@ -56,6 +56,14 @@ const ForeignKind kForeignKinds[] = {
      {},
      "is a scene of a kind that is not read",
      "open it in Blender or its own program and export GLB (glTF)"},
+    {{".mvnx"},
+     {},
+     "is a recording of Xsens MVN, which is not read",
+     "export BVH or FBX there (File > Export)"},
+    {{".mot", ".sto"},
+     {},
+     "holds angles of an OpenSim model, which is not read",
+     "give the joints' positions (TRC), or export BVH"},
     {{".c3d", ".trc", ".tak"},
      {},
      "holds markers, not a skeleton",
@@ -64,10 +72,19 @@ const ForeignKind kForeignKinds[] = {
      {"solid ", "OFF\n", "OFF\r", "#VRML", "DRACO", "LASF", "ASTM-E57", "# vtk DataFile"},
      "is a cloud or mesh of a kind that is not read",
      "open it in MeshLab, CloudCompare or Open3D and save it as PLY"},
-    {{".pkl", ".pickle", ".pt", ".pth"},
+    {{".pkl", ".pickle", ".pt", ".pth", ".joblib"},
      {"\x80\x02"sv, "\x80\x03"sv, "\x80\x04"sv, "\x80\x05"sv},
-     "is a pickle, which can run code and is never read",
-     "convert it to plain arrays (docs/formats.md shows how)"},
+     "is a pickle, of which only motions of a body model are read",
+     "convert clouds to plain arrays (docs/formats.md shows how)"},
+    {{".ckpt"}, {}, "holds a network's weights", "give what the network has written"},
+    {{".r3d"},
+     {},
+     "is a recording of Record3D, which is not read",
+     "export its point clouds there (PLY)"},
+    {{".sog", ".spz", ".ksplat"},
+     {},
+     "is a Gaussian splat of a kind that is not read",
+     "save it as uncompressed PLY, as SuperSplat does"},
     {{".mat"},
      {"MATLAB 5.0 MAT-file"},
      "is a file of MATLAB",
@@ -80,7 +97,8 @@ const ForeignKind kForeignKinds[] = {
     {{".png", ".jpg", ".jpeg", ".exr", ".tif", ".tiff"},
      {"\x89PNG"sv, "\xFF\xD8\xFF"sv, "\x76\x2F\x31\x01"sv, "II*\0"sv, "MM\0*"sv},
      "is a picture, not a cloud",
-     "make clouds of depth pictures with the camera's own tools, as PLY"},
+     "restage data import FOLDER --intrinsics FX,FY,CX,CY makes clouds of depth pictures (PNG of "
+     "16 bits)"},
     {{},
      {"<!DOCTYPE html", "<!doctype html", "<html", "<HTML"},
      "is a web page, not what its name says",
@@ -103,6 +121,11 @@ constexpr uint64_t kFirstBytes = 512;  // bytes that tell every kind
 
 bool is_packed_text_name(const std::string& path) {
   return text::ends_in(path, {".bvh.xz", ".amc.xz", ".asf.xz"});
+}
+
+/// What has a name that says more of it than that it is packed.
+bool is_named_kind(const std::string& path) {
+  return text::ends_in(path, {".r3d", ".sog", ".spz", ".ksplat", ".ckpt"});
 }
 
 /// Zip in .npz and .usdz, xz in .bvh.xz.
@@ -139,6 +162,9 @@ bool is_lfs_pointer(std::string_view content) {
 }
 
 void refuse_foreign_content(std::string_view content, const std::string& path) {
+  for (const ForeignKind& kind : kForeignKinds)
+    if (is_named_kind(path) && text::ends_in(path, kind.endings))
+      throw InputError(path, kind.what, kind.mend);
   if (is_lfs_pointer(content))
     throw InputError(path, "is a Git LFS pointer, not the file itself", "run git lfs pull");
   const std::string_view bare = content.starts_with("\xEF\xBB\xBF") ? content.substr(3) : content;

@@ -8,6 +8,7 @@ namespace restage::cli {
 
 void add_adapt(Program& program);
 void add_assess(Program& program);
+void add_benchmark(Program& program);
 void add_compare(Program& program);
 void add_completion(Program& program);
 void add_data(Program& program);
@@ -31,10 +32,13 @@ void add_retarget(Program& program);
 void add_skeleton(Program& program);
 void add_stream(Program& program);
 void add_sweep(Program& program);
-void add_sweep_export(Program& program, CommandOptions group);  // of `sweep`, as all add_sweep_*
+void add_sweep_ask(Program& program, CommandOptions group);  // of `sweep`, as all add_sweep_*
+void add_sweep_export(Program& program, CommandOptions group);
 void add_sweep_table(Program& program, CommandOptions group);
+void add_track(Program& program);
 void add_train(Program& program);
 void add_view(Program& program);
+void add_watch(Program& program);
 void add_weights(Program& program);
 
 /// Adds every command, in the order of `restage --help`.

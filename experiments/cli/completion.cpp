@@ -74,6 +74,7 @@ std::string script_of(const std::string& shell, const CommandTree& program) {
   return shell == "bash"   ? bash_completion(program)
          : shell == "zsh"  ? zsh_completion(program)
          : shell == "fish" ? fish_completion(program)
+         : shell == "json" ? json_table(program)
                            : python_options(program);
 }
 
@@ -238,6 +239,31 @@ std::string python_options(const CommandTree& program) {
          typed_dict("TrainOptions", command_called(program, "train"), {});
 }
 
+namespace {
+
+Json option_json(const CommandTree::Option& o) {
+  constexpr const char* kKinds[] = {"flag", "text", "whole", "number", "number_or_unit"};
+  return {{"name", o.name},         {"help", o.help},
+          {"value", o.value},       {"kind", kKinds[static_cast<int>(o.kind)]},
+          {"choices", o.choices},   {"default", o.default_value},
+          {"required", o.required}, {"several", o.several},
+          {"formerly", o.formerly}, {"heading", o.heading}};
+}
+
+Json command_json(const CommandTree& command) {
+  Json options = Json::array(), arguments = Json::array(), commands = Json::array();
+  for (const auto& option : command.options) options.push_back(option_json(option));
+  for (const auto& argument : command.arguments) arguments.push_back(option_json(argument));
+  for (const auto& sub : command.commands) commands.push_back(command_json(sub));
+  return {{"name", command.name},          {"help", command.help},
+          {"examples", command.examples},  {"arguments", std::move(arguments)},
+          {"options", std::move(options)}, {"commands", std::move(commands)}};
+}
+
+}  // namespace
+
+std::string json_table(const CommandTree& program) { return command_json(program).dump(1) + "\n"; }
+
 void add_completion(Program& program) {
   const auto shell = std::make_shared<std::string>();
   auto command =
@@ -245,7 +271,8 @@ void add_completion(Program& program) {
                   "restage completion bash > ~/.local/share/bash-completion/completions/restage\n"
                   "restage completion zsh > ~/.zfunc/_restage\n"
                   "restage completion fish > ~/.config/fish/completions/restage.fish\n"
-                  "restage completion python > python/restage/_options.pyi",
+                  "restage completion python > python/restage/_options.pyi\n"
+                  "restage completion json > options.json",
                   [&program, shell] {
                     const std::string script = script_of(*shell, program.tree());
                     print(program.common().json, {{"shell", *shell}, {"script", script}}, script);
@@ -253,9 +280,10 @@ void add_completion(Program& program) {
                   });
   command
       .add_option("SHELL", *shell,
-                  "bash, zsh or fish; python: a stub of the options of its functions")
+                  "bash, zsh or fish; python: a stub of the options of its functions; json: all "
+                  "commands and options as data")
       .required()
-      .one_of({"bash", "zsh", "fish", "python"});
+      .one_of({"bash", "zsh", "fish", "python", "json"});
 }
 
 }  // namespace restage::cli

@@ -18,11 +18,14 @@ struct CommandTree {
     std::string default_value;               ///< OptionFacts::default_value
     bool required = false, several = false;  ///< has to be given; may be given more than once
     std::vector<std::string> formerly;       ///< OptionFacts::formerly
+    std::string heading;                     ///< under which the help page lists it
   };
   std::string name, help;
   std::vector<Option> options;
   std::vector<CommandTree> commands;
   std::vector<std::string> words;  ///< that may stand where files may
+  std::vector<Option> arguments;   ///< words without a name, such as "FILE"
+  std::string examples;            ///< of the help page, one a line
 };
 
 /// A script for bash, zsh or fish.
@@ -31,6 +34,8 @@ std::string zsh_completion(const CommandTree& program);
 std::string fish_completion(const CommandTree& program);
 /// The options of Python's functions as a stub (python/restage/_options.pyi).
 std::string python_options(const CommandTree& program);
+/// All of it as JSON, from which docs/commands.md is made (docs/make_commands.py).
+std::string json_table(const CommandTree& program);
 /// What Python's System takes, as a command.
 CommandTree system_options();
 /// Options of a shell, which mean nothing to a caller in Python.

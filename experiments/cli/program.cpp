@@ -61,6 +61,15 @@ std::string with_heading(const std::string& examples) {
   return text;
 }
 
+/// What with_heading() had been given.
+std::string without_indent(const std::string& text) {
+  std::string out;
+  std::istringstream lines(text);
+  for (std::string line; std::getline(lines, line);)
+    out += (out.empty() ? "" : "\n") + (line.starts_with("  ") ? line.substr(2) : line);
+  return out;
+}
+
 /// The command that was chosen, or was being read.
 const CLI::App& innermost(const CLI::App& app) {
   return app.get_subcommands().empty() ? app : innermost(*app.get_subcommands().back());
@@ -146,20 +155,37 @@ std::vector<std::string> choices_of(const std::string& type) {
   return out;
 }
 
+CommandTree::Option described(const CLI::Option& option, const OptionFacts& facts,
+                              const std::string& name) {
+  return {name,
+          option.get_description(),
+          option.get_items_expected_max() > 0,
+          choices_of(option.get_type_name()),
+          facts.kind,
+          facts.default_value,
+          option.get_required(),
+          option.get_items_expected_max() > 1,
+          facts.formerly,
+          option.get_group()};
+}
+
 CommandTree described(const CLI::App& command, const OptionTable& table) {
+  constexpr std::string_view kExamples = "Examples:\n  ";
   CommandTree out;
   out.name = command.get_name();
   out.help = command.get_description();
+  if (const std::string footer = command.get_footer(); footer.starts_with(kExamples))
+    out.examples = without_indent(footer.substr(kExamples.size()));
   for (const CLI::Option* option : command.get_options()) {
     const OptionFacts& facts = facts_of(table, option);
-    if (option->get_positional())
+    if (option->get_positional()) {
       for (const auto& words : {choices_of(option->get_type_name()), facts.suggestions})
         out.words.insert(out.words.end(), words.begin(), words.end());
+      if (option->get_lnames().empty())
+        out.arguments.push_back(described(*option, facts, option->get_name()));
+    }
     for (const std::string& name : option->get_lnames())
-      out.options.push_back(
-          {"--" + name, option->get_description(), option->get_items_expected_max() > 0,
-           choices_of(option->get_type_name()), facts.kind, facts.default_value,
-           option->get_required(), option->get_items_expected_max() > 1, facts.formerly});
+      out.options.push_back(described(*option, facts, "--" + name));
   }
   for (const CLI::App* sub : command.get_subcommands([](const CLI::App*) { return true; }))
     if (!sub->get_group().empty()) out.commands.push_back(described(*sub, table));
@@ -200,6 +226,23 @@ std::string in_plain_words(const CLI::App& command, const CLI::ParseError& error
   return option->get_name() + " is required" + (says.size() < kShort ? ": " + says : "");
 }
 
+/// An option of several values whose last one is a file, where a word of the command is missing;
+/// null: there is none.
+const CLI::Option* swallowing(const CLI::App& command) {
+  const std::vector<const CLI::Option*> all = command.get_options();
+  const bool missing = std::any_of(all.begin(), all.end(), [](const CLI::Option* option) {
+    return option->get_positional() && option->get_required() && option->count() == 0;
+  });
+  for (const CLI::Option* option : all) {
+    std::error_code ignored;
+    const bool many = option->nonpositional() && option->get_expected_max() > 1 &&
+                      option->get_allow_extra_args() && option->results().size() > 1;
+    if (missing && many && std::filesystem::exists(option->results().back(), ignored))
+      return option;
+  }
+  return nullptr;
+}
+
 /// What was wrong with the arguments that `app` just refused, with the nearest known name.
 InputError usage_error(const CLI::App& app, const CLI::ParseError& error) {
   const CLI::App& command = innermost(app);
@@ -222,6 +265,11 @@ InputError usage_error(const CLI::App& app, const CLI::ParseError& error) {
   if (!known.empty() && command.get_subcommands().empty() &&
       dynamic_cast<const CLI::RequiredError*>(&error) != nullptr)
     return InputError("", "'" + words + "' needs a command", help);
+  if (const CLI::Option* option = swallowing(command)) {
+    const std::string name = option->get_name(), file = option->results().back();
+    return InputError("", name + " takes several values, and took '" + file + "' for one of them",
+                      "put '" + file + "' before " + name);
+  }
   return InputError("", in_plain_words(command, error), help);
 }
 

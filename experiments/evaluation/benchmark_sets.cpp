@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <memory>
 
+#include "autograd/base/atomic_file.h"
 #include "autograd/base/interrupt.h"
 #include "autograd/base/log.h"
 #include "datasets/benchmark/recipe.h"
@@ -159,14 +160,31 @@ void add(References made, References* all) {
     (*all)[r].second.sequences.push_back(std::move(made[r].second.sequences[0]));
 }
 
-void judge(const Bundle& weights, const std::string& folder, bool scans,
-           const BenchmarkOptions& how, SystemScores* scores) {
+/// Who answers, and what is asked for.
+struct Judged {
+  BenchmarkAnswer answer;
+  const BenchmarkOptions& how;
+  const Bundle* weights = nullptr;  ///< null: the answers are there already, and must fit
+};
+
+void check_definition(const Judged& judged, const PredictionFile& truth) {
+  if (judged.weights == nullptr) return;
+  const auto roles = system_type(judged.how.system).roles;
+  common_definition({{truth.data.definition, truth.path},
+                     {joint_definition(judged.weights->only(roles), "weights"), "the system"}},
+                    "judge the weights on data with the joints that they were trained on");
+}
+
+void no_values(const Judged& judged, SystemScores* scores) {
+  scores->model.sequences.emplace_back(judged.how.metrics.size(), std::nullopt);
+}
+
+void judge(const Judged& judged, const std::string& folder, const std::string& name, bool scans,
+           SystemScores* scores) {
+  const BenchmarkOptions& how = judged.how;
   PredictionFile truth(in(folder, "truth.h5")), source(in(folder, "source.h5")),
       rest(in(folder, "rest.h5"));
-  common_definition(
-      {{truth.data.definition, truth.path},
-       {joint_definition(weights.only(system_type(how.system).roles), "weights"), "the system"}},
-      "judge the weights on data with the joints that they were trained on");
+  check_definition(judged, truth);
   const std::optional<WorldMap> to_world = source_to_world(truth.path);
   if (scans && !to_world)
     throw InputError(truth.path, "does not say where its scans are", "build the benchmark again");
@@ -179,13 +197,15 @@ void judge(const Bundle& weights, const std::string& folder, bool scans,
   truth.thin(how.every);
   scores->frames.push_back(truth.data.frames);
   try {
-    const PredictionFile pred(folder, retarget_sequence(weights, folder, how));
-    scores->model.sequences.push_back(score(pred, truth, how));
-    scores->joint_errors.push_back(joint_errors(pred.joints(), truth.joints()));
-    add_frames(pred, truth, scores);
+    const std::optional<PredictionFile> pred = judged.answer(folder, name);
+    if (!pred) return no_values(judged, scores);
+    scores->model.sequences.push_back(score(*pred, truth, how));
+    scores->joint_errors.push_back(joint_errors(pred->joints(), truth.joints()));
+    add_frames(*pred, truth, scores);
   } catch (const InputError& error) {
+    if (judged.weights == nullptr) throw;
     log_warning(folder + " is without a result: " + error.what());
-    scores->model.sequences.emplace_back(how.metrics.size(), std::nullopt);
+    no_values(judged, scores);
   }
 }
 
@@ -228,19 +248,58 @@ MadeSequences seen_motions(const std::string& folder) {
   return out;
 }
 
-void judge_made(const Bundle& weights, const MadeSequences& made, const BenchmarkOptions& how,
-                SystemScores* scores, std::vector<std::string>* names) {
+std::string name_of(const Corpus& corpus, const EvalSequence& s) {
+  return corpus.motions[s.motion].id + "-" + corpus.bodies[s.body_a].id + "-" +
+         corpus.bodies[s.body_b].id;
+}
+
+void judge_made(const Judged& judged, const MadeSequences& made, SystemScores* scores,
+                std::vector<std::string>* names) {
   const Corpus& corpus = made.corpus;
   for (const EvalSequence& s : made.sequences) {
     const Scratch scratch;
     const Performance performance(corpus, s, ScanConfig{}, 0);
     const FileInfo info{corpus.license, corpus.description};
     write_sequence(performance, info, scratch.folder());
-    if (needs_correspondence(weights)) write_source_mesh(performance, info, scratch.folder());
-    names->push_back(corpus.motions[s.motion].id + "-" + corpus.bodies[s.body_a].id + "-" +
-                     corpus.bodies[s.body_b].id);
-    judge(weights, scratch.folder(), false, how, scores);
+    if (judged.weights != nullptr && needs_correspondence(*judged.weights))
+      write_source_mesh(performance, info, scratch.folder());
+    names->push_back(name_of(corpus, s));
+    judge(judged, scratch.folder(), names->back(), false, scores);
   }
+}
+
+/// The folders of a set that lies in files, in order.
+std::vector<fs::path> places_of(const std::string& folder, const std::string& set) {
+  std::vector<fs::path> places;
+  std::error_code error;
+  for (const auto& entry : fs::directory_iterator(fs::path(folder) / set, error))
+    places.push_back(entry.path());
+  if (error || places.empty())
+    throw InputError(folder, "has no set '" + set + "'", "build the benchmark again");
+  std::sort(places.begin(), places.end());
+  return places;
+}
+
+bool is_made(const std::string& set) { return set == "test" || set == "seen"; }
+
+MadeSequences made_sequences(const std::string& folder, const std::string& set) {
+  return set == "test" ? test_clips(folder) : seen_motions(folder);
+}
+
+SystemScores judge_set(const Judged& judged, const std::string& folder, const std::string& set,
+                       std::vector<std::string>* names) {
+  SystemScores out;
+  if (is_made(set)) {
+    judge_made(judged, made_sequences(folder, set), &out, names);
+  } else {
+    for (const fs::path& place : places_of(folder, set)) {
+      names->push_back(place.filename().string());
+      judge(judged, place.string(), names->back(), set == "scans", &out);
+    }
+  }
+  metrics::average(&out.model);
+  for (auto& [name, reference] : out.references) metrics::average(&reference);
+  return out;
 }
 
 }  // namespace
@@ -263,26 +322,59 @@ SystemScores evaluate_benchmark_set(const Bundle& weights, const std::string& fo
                                     std::vector<std::string>* names) {
   check_benchmark_set(set);
   for (const std::string& role : system_type(how.system).roles) weights.need(role, "the trial");
-  SystemScores out;
-  if (set == "test" || set == "seen") {
-    judge_made(weights, set == "test" ? test_clips(folder) : seen_motions(folder), how, &out,
-               names);
+  const BenchmarkAnswer answer = [&](const std::string& sequence, const std::string&) {
+    return std::optional(PredictionFile(sequence, retarget_sequence(weights, sequence, how)));
+  };
+  return judge_set({answer, how, &weights}, folder, set, names);
+}
+
+std::vector<BenchmarkSequence> benchmark_sequences(const std::string& folder,
+                                                   const std::string& set) {
+  check_benchmark_set(set);
+  std::vector<BenchmarkSequence> out;
+  if (is_made(set)) {
+    const MadeSequences made = made_sequences(folder, set);
+    for (const EvalSequence& s : made.sequences)
+      out.push_back({name_of(made.corpus, s), static_cast<int64_t>(s.frames),
+                     std::ssize(made.corpus.bodies[s.body_b].rest.vertices)});
   } else {
-    std::vector<fs::path> places;
-    std::error_code error;
-    for (const auto& entry : fs::directory_iterator(fs::path(folder) / set, error))
-      places.push_back(entry.path());
-    if (error || places.empty())
-      throw InputError(folder, "has no set '" + set + "'", "build the benchmark again");
-    std::sort(places.begin(), places.end());
-    for (const fs::path& place : places) {
-      names->push_back(place.filename().string());
-      judge(weights, place.string(), set == "scans", how, &out);
+    for (const fs::path& place : places_of(folder, set)) {
+      const PredictionFile truth(in(place.string(), "truth.h5"));
+      out.push_back({place.filename().string(), truth.data.frames, truth.data.vertex_count});
     }
   }
-  metrics::average(&out.model);
-  for (auto& [name, reference] : out.references) metrics::average(&reference);
   return out;
+}
+
+std::vector<std::string> write_benchmark_sequences(const std::string& folder,
+                                                   const std::string& set, const std::string& out,
+                                                   bool truth) {
+  check_benchmark_set(set);
+  if (!is_made(set))
+    throw InputError(folder, "has the set '" + set + "' in files already",
+                     "take " + (fs::path(folder) / set).string());
+  const MadeSequences made = made_sequences(folder, set);
+  std::vector<std::string> names;
+  for (const EvalSequence& s : made.sequences) {
+    throw_if_stopped();
+    names.push_back(name_of(made.corpus, s));
+    const std::string place = (fs::path(out) / set / names.back()).string();
+    make_folder(place);
+    write_sequence(Performance(made.corpus, s, ScanConfig{}, 0),
+                   {made.corpus.license, made.corpus.description}, place);
+    if (!truth) fs::remove(in(place, "truth.h5"));
+  }
+  return names;
+}
+
+SystemScores evaluate_benchmark_answers(const BenchmarkAnswer& answer, const std::string& folder,
+                                        const std::string& set,
+                                        std::span<const metrics::Metric> metrics,
+                                        std::vector<std::string>* names) {
+  check_benchmark_set(set);
+  BenchmarkOptions how;
+  how.metrics = metrics;
+  return judge_set({answer, how}, folder, set, names);
 }
 
 }  // namespace restage

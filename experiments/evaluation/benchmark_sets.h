@@ -1,6 +1,8 @@
 // The open benchmark's test sets (docs/benchmark.md) as something that weights can be judged on.
 #pragma once
 
+#include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -27,6 +29,33 @@ struct BenchmarkOptions {
 /// result is put back into the world. Without joints if the system has no rig.
 Prediction retarget_sequence(const Bundle& weights, const std::string& folder,
                              const BenchmarkOptions& how = {});
+
+/// One sequence of a set, and what an answer to it holds.
+struct BenchmarkSequence {
+  std::string name;  ///< "walking-male-female"; of a set that is made: motion, source, target
+  int64_t frames = 0, vertices = 0;
+};
+/// The sequences of a set, in order; quick. InputError as evaluate_benchmark_set().
+std::vector<BenchmarkSequence> benchmark_sequences(const std::string& folder,
+                                                   const std::string& set);
+
+/// Writes the files of each sequence of a set that is made (test, seen) to OUT/SET/NAME, as
+/// write_sequence() does; without `truth` no truth.h5. Returns their names. InputError: the set
+/// lies in files already.
+std::vector<std::string> write_benchmark_sequences(const std::string& folder,
+                                                   const std::string& set, const std::string& out,
+                                                   bool truth);
+
+/// What a system answers to the sequence `name`, whose files are in `folder`
+/// (datasets/benchmark/sequence.h), in the world; nothing if it refuses the sequence.
+using BenchmarkAnswer = std::function<std::optional<PredictionFile>(const std::string& folder,
+                                                                    const std::string& name)>;
+/// Compares answers that are there already with the true ones. A sequence without an answer has no
+/// values. InputError of an answer that does not fit its sequence.
+SystemScores evaluate_benchmark_answers(const BenchmarkAnswer& answer, const std::string& folder,
+                                        const std::string& set,
+                                        std::span<const metrics::Metric> metrics,
+                                        std::vector<std::string>* names);
 
 /// Retargets every sequence of a set of the benchmark in `folder`, as `restage retarget` would, and
 /// compares with the true answer. Scans first go through the doctor, as a user's would; a sequence

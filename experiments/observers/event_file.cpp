@@ -3,8 +3,6 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <array>
-#include <bit>
 #include <cerrno>
 #include <chrono>
 #include <cmath>
@@ -13,55 +11,12 @@
 
 #include "autograd/base/error.h"
 #include "autograd/base/host.h"
+#include "experiments/observers/message.h"
 
 namespace restage {
 namespace {
 
 constexpr int kBuckets = 30;
-
-/// One protobuf message, field by field.
-class Message {
- public:
-  Message& number(int field, uint64_t value) {
-    varint(static_cast<uint64_t>(field) << 3);
-    varint(value);
-    return *this;
-  }
-  Message& real(int field, double value) {
-    varint((static_cast<uint64_t>(field) << 3) | 1);
-    return raw(value);
-  }
-  Message& single(int field, float value) {
-    varint((static_cast<uint64_t>(field) << 3) | 5);
-    return raw(value);
-  }
-  Message& bytes(int field, std::string_view value) {
-    varint((static_cast<uint64_t>(field) << 3) | 2);
-    varint(value.size());
-    out_ += value;
-    return *this;
-  }
-  Message& reals(int field, const std::vector<double>& values) {  // packed
-    return bytes(field,
-                 {reinterpret_cast<const char*>(values.data()), values.size() * sizeof(double)});
-  }
-  const std::string& text() const { return out_; }
-
- private:
-  void varint(uint64_t value) {
-    for (; value >= 0x80; value >>= 7) out_ += static_cast<char>((value & 0x7f) | 0x80);
-    out_ += static_cast<char>(value);
-  }
-  template <class T>
-  Message& raw(T value) {
-    static_assert(std::endian::native == std::endian::little);
-    char bytes[sizeof value];
-    std::memcpy(bytes, &value, sizeof value);
-    out_.append(bytes, sizeof value);
-    return *this;
-  }
-  std::string out_;
-};
 
 double now() {
   using namespace std::chrono;
@@ -77,28 +32,12 @@ std::string summary(int64_t step, const Message& value) {
   return event(step).bytes(5, Message().bytes(1, value.text()).text()).text();
 }
 
-template <class T>
-std::string as_bytes(T value) {
-  std::string out(sizeof value, '\0');
-  std::memcpy(out.data(), &value, sizeof value);
-  return out;
-}
-
 }  // namespace
 
 uint32_t masked_crc32c(std::string_view bytes) {
-  static const std::array<uint32_t, 256> table = [] {
-    std::array<uint32_t, 256> out{};
-    for (uint32_t i = 0; i < 256; ++i) {
-      uint32_t x = i;
-      for (int bit = 0; bit < 8; ++bit) x = (x >> 1) ^ (x & 1 ? 0x82f63b78u : 0);
-      out[i] = x;
-    }
-    return out;
-  }();
-  uint32_t crc = ~0u;
-  for (const char c : bytes) crc = (crc >> 8) ^ table[(crc ^ static_cast<uint8_t>(c)) & 0xff];
-  crc = ~crc;
+  constexpr uint32_t kCastagnoli = 0x82f63b78u;
+  static const CheckSum sum(kCastagnoli);
+  const uint32_t crc = sum.of(bytes);
   return ((crc >> 15) | (crc << 17)) + 0xa282ead8u;
 }
 

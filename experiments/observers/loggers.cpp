@@ -1,11 +1,14 @@
 #include "experiments/observers/loggers.h"
 
+#include <algorithm>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <sstream>
 
 #include "autograd/base/atomic_file.h"
 #include "autograd/base/error.h"
+#include "experiments/observers/mlflow_log.h"
+#include "experiments/observers/wandb_log.h"
 #include "infer/render/sheet.h"
 
 namespace restage {
@@ -57,6 +60,33 @@ void CsvLog::on_checkpoint(const Stage&, int64_t, const std::string&) {
         out += place + name + "," + (value.is_null() ? "" : value.dump()) + "\n";
   }
   write_file_atomically(run_ + "/metrics.csv", out);
+}
+
+RunLogs::RunLogs(const std::string& run, const std::string& name, const std::string& yaml,
+                 const std::vector<std::string>& logs) {
+  const auto named = [&](const char* log) {
+    return std::find(logs.begin(), logs.end(), log) != logs.end();
+  };
+  if (named("tensorboard")) all_.push_back(std::make_unique<TensorBoardLog>(run));
+  if (named("csv")) all_.push_back(std::make_unique<CsvLog>(run));
+  if (!named("wandb") && !named("mlflow")) return;
+  const RunFacts facts = run_facts(run, name, yaml);
+  std::vector<std::unique_ptr<MirroredLog>> mirrored;
+  if (named("wandb")) mirrored.push_back(std::make_unique<WandbLog>(facts));
+  if (named("mlflow")) mirrored.push_back(std::make_unique<MlflowLog>(facts));
+  auto log = std::make_unique<MirroredLogs>(facts, std::move(mirrored));
+  mirrored_ = log.get();
+  all_.push_back(std::move(log));
+}
+
+std::vector<TrainObserver*> RunLogs::observers() const {
+  std::vector<TrainObserver*> out;
+  for (const auto& one : all_) out.push_back(one.get());
+  return out;
+}
+
+void RunLogs::end(RunEnd how) {
+  if (mirrored_ != nullptr) mirrored_->end(how);
 }
 
 }  // namespace restage

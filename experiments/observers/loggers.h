@@ -1,10 +1,13 @@
-// What `restage train --tensorboard --csv` hangs on the loop.
+// What loop.logs, --tensorboard and --csv hang on the loop of `restage train`.
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "experiments/observers/event_file.h"
+#include "experiments/observers/mirrored_logs.h"
 #include "train/trainer.h"
 
 namespace restage {
@@ -33,6 +36,22 @@ class CsvLog final : public TrainObserver {
 
  private:
   std::string run_;
+};
+
+/// All logs of a run that loop.logs names. A run that goes on has been taken back to its
+/// checkpoint.
+class RunLogs {
+ public:
+  /// `run`: the folder; `name` and `yaml`: of its configuration.
+  RunLogs(const std::string& run, const std::string& name, const std::string& yaml,
+          const std::vector<std::string>& logs);
+  std::vector<TrainObserver*> observers() const;
+  /// How the training ended, for logs that say so.
+  void end(RunEnd how);
+
+ private:
+  std::vector<std::unique_ptr<TrainObserver>> all_;
+  MirroredLogs* mirrored_ = nullptr;  // one of them
 };
 
 }  // namespace restage

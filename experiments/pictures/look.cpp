@@ -1,6 +1,7 @@
 #include "experiments/pictures/look.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "autograd/base/error.h"
@@ -16,7 +17,8 @@ constexpr float kJointReach = 0.25f;  // metres
 /// What is to be seen of a joint, beyond the joint itself.
 struct Landmark {
   Point at;
-  float reach;  ///< metres
+  float reach;   ///< metres
+  int end = -1;  ///< the joint beyond which all of the surface is to be seen; -1: none
 };
 
 /// The number of the joint of that name; kJoints: there is none.
@@ -31,7 +33,7 @@ std::vector<Landmark> landmarks(const Joints& joints, const std::string& part) {
   const auto size = static_cast<float>(leg / 0.85);  // of the person; 1: about 1.75 m tall
   const auto beyond = [&](int joint, int before, double share, float reach) {
     const Vec3 at = joints[joint] + share * (joints[joint] - joints[before]);
-    return Landmark{at.cast<float>(), reach * size};
+    return Landmark{at.cast<float>(), reach * size, joint};
   };
   if (part == "head") return {beyond(kHead, kNeck, 0.7, 0.2f)};
   if (part == "feet")
@@ -42,6 +44,45 @@ std::vector<Landmark> landmarks(const Joints& joints, const std::string& part) {
   if (part != "right-hand") out.push_back(beyond(kLeftWrist, kLeftElbow, 0.35, 0.18f));
   if (part != "left-hand") out.push_back(beyond(kRightWrist, kRightElbow, 0.35, 0.18f));
   return out;
+}
+
+/// Of each joint the vertices beyond it: those of heads, hands and feet.
+using Ends = std::array<std::vector<size_t>, kJoints>;
+
+/// Beyond a joint lie the vertices that are nearer to the line on which its bone goes on than to
+/// any bone.
+Ends ends_of(const Points& surface, const Joints& joints) {
+  Ends out;
+  for (size_t v = 0; v < surface.size(); ++v) {
+    const Vec3 p = surface[v].cast<double>();
+    double least = INFINITY;
+    int end = -1;
+    for (int j = 1; j < kJoints; ++j) {
+      const Vec3 from = joints[kParents[j]], along = joints[j] - from;
+      const bool is_end =
+          j == kHead || j == kLeftWrist || j == kRightWrist || j == kLeftFoot || j == kRightFoot;
+      const double share = (p - from).dot(along) / std::max(along.squaredNorm(), 1e-12);
+      const double on = std::clamp(share, 0.0, is_end ? 1e9 : 1.0);
+      const double away = (p - from - on * along).squaredNorm();
+      if (!(away < least)) continue;
+      least = away;
+      end = is_end && on > (j == kLeftFoot || j == kRightFoot ? 0 : 1) ? j : -1;
+    }
+    if (end >= 0) out[static_cast<size_t>(end)].push_back(v);
+  }
+  return out;
+}
+
+/// Around the vertices beyond a landmark's joint; something long in a hand does not count.
+Box end_box(const Landmark& mark, const Ends& ends, const Points& surface) {
+  constexpr float kRoom = 0.1f;  // of its size, on each side
+  const float most = (mark.end == kHead ? 12 : 4) * mark.reach;
+  Box out;
+  for (const size_t v : ends[static_cast<size_t>(mark.end)])
+    if ((surface[v] - mark.at).norm() < most) out.extend(surface[v]);
+  if (out.isEmpty()) return out;
+  const Point room = kRoom * out.sizes();
+  return {out.min() - room, out.max() + room};
 }
 
 }  // namespace
@@ -56,13 +97,17 @@ void check_look(const Look& look) {
       near.empty() ? "use one of " + cut_list(parts, 150) : "did you mean '" + near + "'?");
 }
 
-Aim aim_at(const std::vector<Joints>& frames, const Look& look) {
+Aim aim_at(const std::vector<Joints>& frames, const Look& look, const Clip& clip) {
   Aim aim;
   if (look.part.empty()) return aim;
-  for (const Joints& frame : frames) {
+  const bool surface = !clip.faces.empty() && clip.frames.size() == frames.size();
+  const Ends ends = surface ? ends_of(clip.frames[0], frames[0]) : Ends();
+  for (size_t f = 0; f < frames.size(); ++f) {
     Box box;
-    for (const Landmark& mark : landmarks(frame, look.part))
+    for (const Landmark& mark : landmarks(frames[f], look.part)) {
       box.extend(Box(mark.at - Point::Constant(mark.reach), mark.at + Point::Constant(mark.reach)));
+      if (surface && mark.end >= 0) box.extend(end_box(mark, ends, clip.frames[f]));
+    }
     aim.focus.push_back(box.center());
     aim.close_up = std::max(aim.close_up, 0.5 * static_cast<double>(box.sizes().maxCoeff()));
   }

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "infer/render/clip.h"
 #include "nn/geometry/skeleton.h"
 
 namespace restage {
@@ -23,8 +24,10 @@ struct Aim {
   double close_up = 0;       ///< metres to either side: SheetOptions, FilmOptions::close_up
 };
 
-/// A close-up of `look` in every frame; nothing of both where whole figures are asked for.
-Aim aim_at(const std::vector<Joints>& frames, const Look& look);
+/// A close-up of `look` in every frame; nothing of both where whole figures are asked for. Heads,
+/// hands and feet of a surface are shown whole, however large they are on this body. `frames`: of
+/// `clip`.
+Aim aim_at(const std::vector<Joints>& frames, const Look& look, const Clip& clip);
 
 /// Where hips and shoulders face, degrees from +z to +x.
 double facing(const Joints& joints);

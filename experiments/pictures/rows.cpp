@@ -138,7 +138,7 @@ Rows read_rows(const SourceRecord& file, const Comparison& how, const Look& look
     }
     Clip out = read_clip(one, label, max_memory, rows.remarks);
     if (look.part.empty()) return out;
-    Aim aim = aim_at(read_joints(one.path, one.sequence), look);
+    Aim aim = aim_at(read_joints(one.path, one.sequence), look, out);
     out.focus = std::move(aim.focus);
     rows.close_up = std::max(rows.close_up, aim.close_up);
     return out;

@@ -6,10 +6,11 @@
 
 #include "autograd/base/error.h"
 #include "autograd/base/format.h"
+#include "datasets/characters/mesh_document.h"
 #include "datasets/importers/motions/skeleton_take.h"
 #include "datasets/importers/rigs/gltf_rig.h"
+#include "datasets/readers/clouds/mesh_io.h"
 #include "datasets/readers/errors.h"
-#include "datasets/readers/gltf/gltf_look.h"
 #include "datasets/readers/text/text.h"
 #include "nn/geometry/box.h"
 
@@ -48,7 +49,7 @@ void look_at(Showing& view, const std::vector<Joints>& joints, const ShowRequest
   if (joints.size() != view.clip.frames.size())
     throw InputError(request.path, "does not say where to look for " + request.look.part,
                      "leave the close-up out, or say which bone is which (docs/formats.md)");
-  Aim aim = aim_at(joints, request.look);
+  Aim aim = aim_at(joints, request.look, view.clip);
   view.clip.focus = std::move(aim.focus);
   view.close_up = aim.close_up;
 }
@@ -111,8 +112,8 @@ std::vector<int> bones_of(const Gltf& file) {
   return out;
 }
 
-Showing view_gltf(const ShowRequest& request) {
-  GltfLook look = read_gltf_look(request.path);
+/// A document, or a mesh of another kind as one (dressed()).
+Showing view_gltf(const ShowRequest& request, GltfLook look) {
   const Gltf& file = look.file;
   const GltfClip* clip = clip_of(look, request.clip);
   const std::vector<int> bones = bones_of(file);
@@ -148,10 +149,7 @@ Showing view_gltf(const ShowRequest& request) {
     view.clip.frames.push_back(std::move(mesh.vertices));
   }
   view.clip.fps /= static_cast<double>(request.every);
-  // Without any material a surface is drawn as those of other files are.
-  const bool dressed = look.look.materials.size() > 1 || !look.look.colours.empty();
-  if (!view.clip.faces.empty() && dressed)
-    view.clip.look = std::make_shared<const Appearance>(std::move(look.look));
+  if (!view.clip.faces.empty()) view.clip.look = appearance_of(look);
   view.remarks = file.remarks;
   fit(view, joints);
   look_at(view, joints, request);
@@ -229,6 +227,28 @@ Showing view_others(const ShowRequest& request) {
 
 }  // namespace
 
+namespace {
+
+/// An OBJ or PLY file with pictures or colours, as a document; nothing: it has none, or is to be
+/// turned or scaled.
+std::optional<GltfLook> dressed(const ShowRequest& request, std::vector<std::string>& remarks) {
+  if (!text::ends_in(request.path, {".obj", ".ply"})) return std::nullopt;
+  if (!request.up.empty() || request.scale || !request.clip.empty()) return std::nullopt;
+  const std::optional<MeshDocument> made =
+      mesh_document(request.path, read_mesh(request.path).vertices.size());
+  if (!made) return std::nullopt;
+  for (const std::string& remark : made->remarks)
+    remarks.push_back(cat(request.path, ": ", remark));
+  return parse_gltf_look(made->glb, request.path);
+}
+
+}  // namespace
+
+std::shared_ptr<const Appearance> appearance_of(GltfLook& look) {
+  if (look.look.materials.size() < 2 && look.look.colours.empty()) return nullptr;
+  return std::make_shared<const Appearance>(std::move(look.look));
+}
+
 Showing read_showing(const ShowRequest& request) {
   const auto refuse_if = [&](bool given, const char* option, const char* what) {
     if (given)
@@ -240,7 +260,13 @@ Showing read_showing(const ShowRequest& request) {
   refuse_if(glTF && request.scale.has_value(), "--scale", "says how large it is");
   refuse_if(request.sequence && !text::ends_in(request.path, {".h5", ".hdf5"}), "--sequence",
             "holds one sequence");
-  return is_gltf_name(request.path) ? view_gltf(request) : view_others(request);
+  if (glTF) return view_gltf(request, read_gltf_look(request.path));
+  std::vector<std::string> remarks;
+  std::optional<GltfLook> look = dressed(request, remarks);
+  if (!look) return view_others(request);
+  Showing out = view_gltf(request, std::move(*look));
+  out.remarks.insert(out.remarks.end(), remarks.begin(), remarks.end());
+  return out;
 }
 
 }  // namespace restage

@@ -1,9 +1,11 @@
 // Any file that is read or written here as a clip that can be drawn, with its own materials.
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <string>
 
+#include "datasets/readers/gltf/gltf_look.h"
 #include "experiments/pictures/clips.h"
 #include "experiments/pictures/look.h"
 #include "infer/render/clip.h"
@@ -38,6 +40,10 @@ struct Showing {
   double facing = 0;      ///< of one frame: degrees that the person is turned from +z to +x
   Remarks remarks;
 };
+
+/// What a glTF file looks like, moved out of `look`. Null: it has neither materials nor colours,
+/// and is drawn as surfaces of other files are.
+std::shared_ptr<const Appearance> appearance_of(GltfLook& look);
 
 /// InputError: the readers' own; a clip, frame or time that is not there; nothing to draw; a part
 /// to look at of a file whose joints are not known.

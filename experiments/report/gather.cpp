@@ -13,7 +13,9 @@
 #include "experiments/evaluation/benchmark_sets.h"
 #include "experiments/evaluation/evaluation.h"
 #include "experiments/pictures/clips.h"
+#include "experiments/report/sweep_pictures.h"
 #include "experiments/scratch.h"
+#include "experiments/sweep/live.h"
 #include "experiments/sweep/sweep_dir.h"
 #include "experiments/sweep/table_formats.h"
 #include "experiments/text.h"
@@ -243,6 +245,34 @@ std::string trials_text(const tables::Results& results) {
   return tables::counts_text(results) + "\n\n" + markdown_table(rows);
 }
 
+/// The ends of the logs of trials that failed.
+void add_failures(const std::string& dir, const tables::Results& results,
+                  std::vector<Section>* sections) {
+  constexpr int kLines = 12;
+  Section out{"Failed trials", "The last lines of their logs.\n"};
+  for (const tables::TrialResult& trial : results.trials) {
+    if (trial.state != TrialState::failed) continue;
+    const std::string log = dir + "/trials/" + trial.id + "/log.txt";
+    std::string lines = sweep::last_lines(log, kLines);
+    if (lines.empty()) lines = trial.error;
+    out.quoted.emplace_back(log, lines);
+  }
+  if (!out.quoted.empty()) sections->push_back(std::move(out));
+}
+
+/// Without a plan that can be read there is no figure that all trials share.
+void add_pictures(const std::string& dir, const tables::Results& results, Report* out) {
+  std::optional<sweep::SweepDir> sweep;
+  try {
+    sweep = sweep::read_sweep_dir(dir);
+  } catch (const InputError&) {  // read_results() told it
+    return;
+  }
+  for (Section& section : sweep_pictures(*sweep, results))
+    out->before.push_back(std::move(section));
+  out->unfinished = !sweep::look_at(*sweep, "").over();
+}
+
 /// The trial that is asked for, or the one with the least error over all sets.
 std::string chosen_trial(const tables::Results& results, const std::string& wanted) {
   std::string best;
@@ -347,7 +377,10 @@ Report of_sweep(const std::string& dir, const GatherOptions& how) {
     const std::string id = chosen_trial(results, how.trial);
     out.plays = played_folders(weights_of(dir, id), how);
   }
-  out.before = {{"Trials", trials_text(results)}, results_section(results)};
+  out.before = {{"Trials", trials_text(results)}};
+  add_failures(dir, results, &out.before);
+  out.before.push_back(results_section(results));
+  add_pictures(dir, results, &out);
   if (out.runs.size() > 1) out.after.push_back(differences(out.runs));
   if (std::error_code ignored; fs::exists(in(dir, "sweep.yaml"), ignored))
     out.files.emplace(out.files.begin(), in(dir, "sweep.yaml"), read_file(in(dir, "sweep.yaml")));

@@ -79,9 +79,21 @@ std::string section_html(const std::string& title, const std::string& body) {
   return "<section><h2>" + escape_html(title) + "</h2>\n" + body + "</section>\n";
 }
 
+std::string folded(const std::vector<std::pair<std::string, std::string>>& texts, bool open) {
+  std::string out;
+  for (const auto& [name, text] : texts)
+    out += std::string("<details") + (open ? " open" : "") + "><summary>" + escape_html(name) +
+           "</summary><pre>" + escape_html(text) + "</pre></details>\n";
+  return out;
+}
+
 std::string sections_html(const std::vector<Section>& sections) {
   std::string out;
-  for (const Section& section : sections) out += section_html(section.title, html_of(section.text));
+  for (const Section& section : sections) {
+    std::string body = html_of(section.text);
+    if (!section.picture.empty()) body += "<div class=\"picture\">" + section.picture + "</div>\n";
+    out += section_html(section.title, body + folded(section.quoted, true));
+  }
   return out;
 }
 
@@ -163,14 +175,6 @@ std::string plays_html(const std::vector<Play>& plays) {
          "</div>\n<iframe id=\"player\" title=\"source, result and truth\"></iframe>\n" + pages;
 }
 
-std::string files_html(const std::vector<std::pair<std::string, std::string>>& files) {
-  std::string out;
-  for (const auto& [name, text] : files)
-    out += "<details><summary>" + escape_html(name) + "</summary><pre>" + escape_html(text) +
-           "</pre></details>\n";
-  return out;
-}
-
 }  // namespace
 
 std::string page(const Report& report) {
@@ -185,9 +189,13 @@ std::string page(const Report& report) {
   if (!report.plays.empty()) body += section_html("Sequences", plays_html(report.plays));
   if (!curves.empty()) body += section_html("Curves", curves_html(report, thinned));
   body += sections_html(report.after);
-  if (!report.files.empty()) body += section_html("Files", files_html(report.files));
+  if (!report.files.empty()) body += section_html("Files", folded(report.files, false));
   const Json data = {{"names", names}, {"colours", colours}, {"curves", curves}};
+  const std::string refresh = report.refresh > 0 ? "<meta http-equiv=\"refresh\" content=\"" +
+                                                       std::to_string(report.refresh) + "\">\n"
+                                                 : "";
   return fill_page(kPage, {{"TITLE", escape_html(report.title)},
+                           {"REFRESH", refresh},
                            {"STYLE", kStyle},
                            {"BODY", body},
                            {"DATA", script_json(ascii(data))},

@@ -11,7 +11,10 @@ namespace restage::report {
 
 struct Section {
   std::string title;
-  std::string text;  ///< paragraphs and tables as our commands print them (Markdown)
+  std::string text;          ///< paragraphs and tables as our commands print them (Markdown)
+  std::string picture = {};  ///< an SVG document of ours, shown below the text
+  /// Shown as they are, folded open: titles and texts.
+  std::vector<std::pair<std::string, std::string>> quoted = {};
 };
 
 /// A sequence that can be played: a page of infer/render/page.h.
@@ -25,7 +28,9 @@ struct Report {
   std::vector<tables::Compared> runs = {};       ///< whose curves are drawn
   std::vector<Play> plays = {};
   std::vector<std::pair<std::string, std::string>> files =
-      {};  ///< shown whole, folded: name and text
+      {};                   ///< shown whole, folded: name and text
+  bool unfinished = false;  ///< a sweep with trials that run or are to come
+  int refresh = 0;          ///< seconds after which a browser reads the page again; 0: never
 };
 
 /// The page as text. Curves with more than 1,000 points are thinned evenly, and it says so. Equal

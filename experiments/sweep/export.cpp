@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cctype>
+#include <cstdio>
 #include <filesystem>
 #include <set>
 
@@ -31,6 +32,18 @@ std::string job_name(const std::string& dir) {
 
 // ---- Slurm -------------------------------------------------------------------------------------
 
+/// Memory, and the time of so many trials one after the other.
+std::string slurm_limits(const ExportOptions& o, size_t trials) {
+  std::string out;
+  if (o.megabytes > 0) out += "#SBATCH --mem=" + std::to_string(o.megabytes) + "M\n";
+  if (o.minutes <= 0) return out;
+  const int64_t minutes = o.minutes * static_cast<int64_t>(trials);
+  char text[48];
+  std::snprintf(text, sizeof text, "#SBATCH --time=%lld:%02lld:00\n",
+                static_cast<long long>(minutes / 60), static_cast<long long>(minutes % 60));
+  return out + text;
+}
+
 std::string slurm_script(const std::vector<sweep::TrialEntry>& plan, const ExportOptions& o) {
   std::string ids;
   for (const sweep::TrialEntry& trial : plan) ids += "  " + trial.id + "\n";
@@ -46,8 +59,9 @@ std::string slurm_script(const std::vector<sweep::TrialEntry>& plan, const Expor
          "\n"
          "#SBATCH --requeue\n"
          "#SBATCH --open-mode=append\n"
-         "#SBATCH --signal=B:TERM@120\n" +
-         (o.threads > 0 ? "#SBATCH --cpus-per-task=" + std::to_string(o.threads) + "\n" : "") +
+         "#SBATCH --signal=B:USR1@120\n"
+         "#SBATCH --cpus-per-task=" +
+         std::to_string(o.threads) + "\n" + slurm_limits(o, (plan.size() + tasks - 1) / tasks) +
          "restage=" + shell_word(o.program) +
          "\n"
          "dir=" +
@@ -59,9 +73,10 @@ std::string slurm_script(const std::vector<sweep::TrialEntry>& plan, const Expor
          "tasks=" +
          std::to_string(tasks) +
          "\n"
-         R"(code=0 stopping= trial=
-# Before the time is up, Slurm tells this shell, and the trial must hear of it to write a checkpoint.
+         R"(code=0 stopping= again= trial=
+# What Slurm tells this shell the trial must hear of, to write a checkpoint. USR1: the time is nearly up.
 trap 'stopping=1; [ -z "$trial" ] || kill -TERM "$trial" 2> /dev/null' TERM
+trap 'stopping=1 again=1; [ -z "$trial" ] || kill -TERM "$trial" 2> /dev/null' USR1
 for ((i = SLURM_ARRAY_TASK_ID; i < ${#ids[@]}; i += tasks)); do
   "$restage" trial "$dir" "${ids[i]}" --threads "${SLURM_CPUS_PER_TASK:-1}" &
   trial=$!
@@ -71,6 +86,8 @@ for ((i = SLURM_ARRAY_TASK_ID; i < ${#ids[@]}; i += tasks)); do
   while kill -0 "$trial" 2> /dev/null; do sleep 0.5; done
   wait "$trial"
   ended=$?
+  # A trial that needed more time than was given goes on in the next job of this task.
+  [ -z "$again" ] || [ "$ended" = 0 ] || scontrol requeue "$SLURM_JOB_ID"
   [ -z "$stopping" ] || exit "$ended"
   trial=
   [ "$ended" = 0 ] || code=$ended
@@ -85,7 +102,7 @@ std::string parallel_list(const std::vector<sweep::TrialEntry>& plan, const Expo
   std::string text;
   for (const sweep::TrialEntry& trial : plan)
     text += shell_word(o.program) + " trial " + shell_word(o.dir) + " " + trial.id + " --threads " +
-            std::to_string(std::max(1, o.threads)) + "\n";
+            std::to_string(o.threads) + "\n";
   return text;
 }
 
@@ -132,7 +149,9 @@ std::string python(const Json& value) { return value.dump(2); }
 
 std::string snakefile(const std::vector<sweep::TrialEntry>& plan, const ExportOptions& o) {
   const std::vector<Shared> shared = shared_artifacts(plan);
-  Json trials = Json::object(), stages = Json::object();
+  Json trials = Json::object(), stages = Json::object(), resources = Json::object();
+  if (o.megabytes > 0) resources["mem_mb"] = o.megabytes;
+  if (o.minutes > 0) resources["runtime"] = o.minutes;
   for (const sweep::TrialEntry& trial : plan) {
     Json& needs = trials[trial.id] = Json::array();
     for (const Shared& s : shared)
@@ -150,7 +169,9 @@ RESTAGE = )" +
 DIR = )" +
          python(o.dir) + R"(
 THREADS = )" +
-         std::to_string(std::max(1, o.threads)) + R"(
+         std::to_string(o.threads) + R"(
+RESOURCES = )" +
+         python(resources) + R"(
 # Each trial with the shared artifacts that it needs; each of these with a trial that it is part of.
 TRIALS = )" +
          python(trials) + R"(
@@ -188,6 +209,7 @@ rule stage:
     wildcard_constraints: name="[^/]+"
     params: trial=lambda wildcards: STAGES[wildcards.name]["trial"], stage=lambda wildcards: STAGES[wildcards.name]["stage"]
     threads: THREADS
+    resources: **RESOURCES
     shell: "{RESTAGE:q} trial {DIR:q} {params.trial} --stage {params.stage:q} --threads {threads} && touch {output:q}"
 
 
@@ -196,6 +218,7 @@ rule trial:
     output: mark("{trial}.trial")
     wildcard_constraints: trial="[0-9a-f]+"
     threads: THREADS
+    resources: **RESOURCES
     shell: "{RESTAGE:q} trial {DIR:q} {wildcards.trial} --threads {threads} && touch {output:q}"
 )";
 }

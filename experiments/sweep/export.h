@@ -16,16 +16,19 @@ enum class Engine { slurm, parallel, snakemake };
 Engine engine_named(const std::string& name);
 
 struct ExportOptions {
-  std::string program;  ///< restage, absolute
-  std::string dir;      ///< of the sweep, absolute
-  int threads = 0;      ///< of a trial; 0: one, or what the engine gives
+  std::string program;    ///< restage, absolute
+  std::string dir;        ///< of the sweep, absolute
+  int threads = 1;        ///< of a trial
+  int64_t megabytes = 0;  ///< that a trial may take; 0: not said
+  int64_t minutes = 0;    ///< that a trial may take; 0: not said
 };
 
 /// The script. slurm: for `sbatch FILE`, an array of at most 1,000 tasks (Slurm's default limit),
-/// which share the trials among them. parallel: for `parallel < FILE`, a command a line. snakemake:
-/// for `snakemake -s FILE`; artifacts that several trials use are jobs of their own, made before
-/// the trials by `restage trial DIR ID --stage STAGE`.
-/// InputError: a path that the engine cannot be told (line breaks; for snakemake also braces).
+/// which share the trials among them; two minutes before a task's time is up its trial writes a
+/// checkpoint, and the task is queued again. parallel: for `parallel < FILE`, a command a line.
+/// snakemake: for `snakemake -s FILE`; artifacts that several trials use are jobs of their own,
+/// made before the trials by `restage trial DIR ID --stage STAGE`. InputError: a path that the
+/// engine cannot be told (line breaks; for snakemake also braces).
 std::string export_script(Engine engine, const std::vector<sweep::TrialEntry>& plan,
                           const ExportOptions& options);
 

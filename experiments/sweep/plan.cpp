@@ -8,6 +8,7 @@
 
 #include "autograd/base/nearest.h"
 #include "autograd/base/words.h"
+#include "experiments/sweep/objective.h"
 #include "nn/config/config.h"
 #include "train/training/train_config.h"
 
@@ -40,15 +41,28 @@ struct Combination {
   Settings settings;  ///< of the case and the axes
 };
 
+/// Grid, zip, and the points of a search.
+std::vector<Axis> axes_of(const SweepFile& file) {
+  std::vector<Axis> out = file.axes;
+  if (!file.search) return out;
+  Axis axis;
+  for (const search::Dimension& one : file.search->space) axis.keys.push_back(one.key);
+  for (const search::Point& point : file.search->points())
+    axis.points.push_back(settings_at(file.search->space, point));
+  out.push_back(std::move(axis));
+  return out;
+}
+
 std::vector<Combination> combinations(const SweepFile& file) {
   size_t count = file.cases.size() * std::max<size_t>(1, file.seeds.size());
-  for (const Axis& axis : file.axes)
+  const std::vector<Axis> axes = axes_of(file);
+  for (const Axis& axis : axes)
     if ((count *= axis.points.size()) > kMostTrials)
       throw InputError(file.path, "gives more than " + std::to_string(kMostTrials) + " trials",
                        "vary fewer keys at once");
   std::vector<Combination> out;
   for (const Case& one : file.cases) out.push_back({&one, one.settings});
-  for (const Axis& axis : file.axes) {
+  for (const Axis& axis : axes) {
     std::vector<Combination> wider;
     for (const Combination& before : out)
       for (const Settings& point : axis.points) {
@@ -71,6 +85,8 @@ const ConfigNode* value_of(const std::string& key, const Combination& combinatio
 std::vector<std::string> keys_of(const SweepFile& file) {
   std::vector<std::string> out;
   for (const Axis& axis : file.axes) out.insert(out.end(), axis.keys.begin(), axis.keys.end());
+  if (file.search)
+    for (const search::Dimension& one : file.search->space) out.push_back(one.key);
   for (const Setting& setting : file.set) out.push_back(setting.key);
   for (const Case& one : file.cases)
     for (const Setting& setting : one.settings) out.push_back(setting.key);
@@ -243,7 +259,7 @@ class Planner {
 void check(const EarlyStop& rule, const SweepPlan& plan) {
   std::vector<std::string> known;
   for (const StageType& type : stage_types())
-    for (const std::string& figure : type.figures) known.push_back(type.name + "." + figure);
+    for (std::string& figure : known_figures(type)) known.push_back(std::move(figure));
   if (std::find(known.begin(), known.end(), rule.metric) == known.end()) {
     const std::string close = nearest(rule.metric, known);
     throw InputError(
@@ -294,6 +310,8 @@ std::vector<std::pair<std::string, ConfigNode>> configurations(const SweepFile& 
 SweepPlan plan_sweep(const SweepFile& file) {
   SweepPlan plan = Planner(file).plan();
   if (file.early_stop) check(*file.early_stop, plan);
+  if (file.search && !file.search->metric.empty())
+    check_metric(file.search->metric, file.search->metric_place, plan, file.evaluate);
   return plan;
 }
 
@@ -311,14 +329,19 @@ Forecast measure(const SweepPlan& plan) {
     if (is_new) stages->second = measure(tree);
     TrainConfig config;
     read_config(tree, config);
+    double own = 0;
     for (const StageArtifact& artifact : trial.artifacts) {
-      if (artifact.there || !counted.insert(artifact.stage + artifact.id).second) continue;
+      if (artifact.there) continue;
+      const bool fresh = counted.insert(artifact.stage + artifact.id).second;
       for (const StageForecast& one : stages->second) {
         if (one.stage != artifact.stage) continue;
+        own += one.seconds(config.loop.validate_every);
+        if (!fresh) continue;
         out.seconds += one.seconds(config.loop.validate_every);
         out.memory_bytes = std::max(out.memory_bytes, one.memory);
       }
     }
+    out.longest = std::max(out.longest, own);
   }
   return out;
 }

@@ -15,6 +15,7 @@ namespace restage::sweep {
 struct Forecast {
   double seconds = 0;        ///< one after the other, on this machine, evaluation apart
   int64_t memory_bytes = 0;  ///< of tensors, in the largest stage
+  double longest = 0;        ///< seconds of the trial that trains longest, as if it shared nothing
 };
 
 struct SweepPlan {
@@ -23,9 +24,9 @@ struct SweepPlan {
   int shared = 0;              ///< those of them that several trials use
 };
 
-/// Every case x grid x zip x seed that is not excluded, in this order, the last fastest. InputError
-/// at file and line: a value that the configuration refuses, a key that no stage reads, an
-/// `exclude` that matches nothing, two combinations that give the same trial.
+/// Every case x grid x zip x point of the search x seed that is not excluded, in this order, the
+/// last fastest. InputError at file and line: a value that the configuration refuses, a key that no
+/// stage reads, an `exclude` that matches nothing, two combinations that give the same trial.
 SweepPlan plan_sweep(const SweepFile& file);
 
 /// The configurations alone, each with the name of its case; seeds apart, and nothing of them is

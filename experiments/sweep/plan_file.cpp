@@ -48,6 +48,20 @@ std::optional<EarlyStop> read_early_stop(const PlanReader& reader, const Json& d
       reader.text(rule, "metric"), reader.text(rule, "rule"), reader.number(rule, "after"), {}};
 }
 
+std::optional<SearchRule> read_search(const PlanReader& reader, const Json& document) {
+  if (reader.at(document, "search").is_null()) return std::nullopt;
+  const Json& search = reader.section(document, "search");
+  const uint64_t trials = reader.count(search, "trials");
+  reader.need(trials <= std::numeric_limits<int>::max(), "trials", "so large elsewhere");
+  return SearchRule{reader.text(search, "kind"), reader.optional_text(search, "metric"),
+                    static_cast<int>(trials)};
+}
+
+Json search_json(const std::optional<SearchRule>& search) {
+  if (!search) return nullptr;
+  return {{"kind", search->kind}, {"metric", search->metric}, {"trials", search->trials}};
+}
+
 }  // namespace
 
 bool is_trial_id(const std::string& text) {
@@ -98,6 +112,7 @@ std::optional<PlanFile> read_plan_file(const std::string& dir) {
   out.store = reader.optional_text(document, "store");
   out.evaluate = read_evaluate(reader, document);
   out.early_stop = read_early_stop(reader, document);
+  out.search = read_search(reader, document);
   if (!reader.at(document, "retries").is_null()) {
     const uint64_t retries = reader.count(document, "retries");
     reader.need(retries <= std::numeric_limits<int>::max(), "retries", "so large elsewhere");
@@ -121,6 +136,7 @@ std::string plan_file_text(const PlanFile& plan) {
       {"evaluate", {{"benchmark", plan.evaluate.benchmark}, {"sets", plan.evaluate.sets}}},
       {"retries", plan.retries},
       {"early_stop", early_stop_json(plan.early_stop)},
+      {"search", search_json(plan.search)},
       {"trials", std::move(trials)}};
   return document.dump(1) + "\n";
 }

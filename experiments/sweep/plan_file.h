@@ -24,12 +24,20 @@ struct TrialEntry {
   std::vector<std::pair<std::string, std::string>> artifacts = {};  ///< stage and id, as made
 };
 
+/// What the folder must know of a search.
+struct SearchRule {
+  std::string kind, metric;
+  int trials = 0;  ///< that `sweep run` asks for, if the kind asks
+  bool asks() const { return kind == "tpe"; }
+};
+
 struct PlanFile {
   std::string directory;  ///< from which the sweep was planned, seen from DIR
   std::string store;      ///< of artifacts, seen from there; "": not said
   Evaluate evaluate;
   int retries = 0;
   std::optional<EarlyStop> early_stop;
+  std::optional<SearchRule> search = {};
   std::vector<TrialEntry> trials;
 };
 

@@ -2,10 +2,12 @@
 
 #include <signal.h>
 #include <sys/wait.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <chrono>
 #include <cstring>
+#include <deque>
 #include <fstream>
 #include <set>
 #include <thread>
@@ -60,13 +62,8 @@ std::string how_it_ended(int status, const std::string& last) {
 class Pool {
  public:
   Pool(const SweepDir& dir, const PoolOptions& options)
-      : dir_(dir), options_(options), token_(stop_token(dir.path)) {
-    for (const TrialEntry& trial : dir.trials) {
-      Slot slot;
-      slot.trial = &trial;
-      slot.state = over(trial).value_or(Slot::State::waiting);
-      slots_.push_back(slot);
-    }
+      : dir_(dir), options_(options), token_(stop_token(dir.path)), asks_(options.ask != nullptr) {
+    for (const TrialEntry& trial : dir.trials) add(trial);
   }
 
   Pool(const Pool&) = delete;
@@ -85,6 +82,10 @@ class Pool {
       const bool ending = stop_requested() || outcome_.stop_requested;
       if (ending) terminate();
       if (!ending && changed_) start_what_is_ready();
+      if (!ending && asks_ && running_ < options_.jobs && !has(Slot::State::waiting)) {
+        ask();
+        continue;
+      }
       if (running_ == 0 && (ending || (!has(Slot::State::waiting) && !has(Slot::State::elsewhere))))
         break;
       std::this_thread::sleep_for(kNap);
@@ -104,6 +105,19 @@ class Pool {
   }
 
  private:
+  void add(const TrialEntry& trial) {
+    Slot slot;
+    slot.trial = &trials_.emplace_back(trial);
+    slot.state = over(trial).value_or(Slot::State::waiting);
+    slots_.push_back(slot);
+  }
+  void ask() {
+    const std::vector<TrialEntry> more = options_.ask();
+    for (const TrialEntry& trial : more) add(trial);
+    asks_ = !more.empty();
+    changed_ = true;
+  }
+
   /// The state of a trial with nothing left to do.
   std::optional<Slot::State> over(const TrialEntry& trial) const {
     const auto result = read_result(dir_, trial.id);
@@ -159,9 +173,10 @@ class Pool {
       leave_to_others(slot);
       return;
     }
-    slot.pid = spawn_self({"restage", "trial", dir_.path, slot.trial->id, "--threads",
-                           std::to_string(options_.threads)},
-                          dir_.log(slot.trial->id), true);
+    slot.pid =
+        spawn_self({"restage", "trial", dir_.path, slot.trial->id, "--threads",
+                    std::to_string(options_.threads), "--ends-with", std::to_string(::getpid())},
+                   dir_.log(slot.trial->id), true);
     offer_to_the_kernel(slot.pid);
     slot.state = Slot::State::running;
     slot.started = Clock::now();
@@ -269,11 +284,13 @@ class Pool {
 
   const SweepDir& dir_;
   const PoolOptions options_;
-  const std::string token_;  ///< of requests to stop, as it was when we began
+  const std::string token_;        ///< of requests to stop, as it was when we began
+  std::deque<TrialEntry> trials_;  ///< of the slots
   std::vector<Slot> slots_;
   PoolOutcome outcome_;
   int running_ = 0;
   bool changed_ = true;  ///< something may be ready
+  bool asks_;            ///< there may be more trials than there are
   bool terminated_ = false;
   Clock::time_point look_ = Clock::now() + kLook;
 };

@@ -3,6 +3,10 @@
 // at a time, or stand beside other engines.
 #pragma once
 
+#include <functional>
+#include <string>
+#include <vector>
+
 #include "experiments/sweep/sweep_dir.h"
 
 namespace restage::sweep {
@@ -10,6 +14,9 @@ namespace restage::sweep {
 struct PoolOptions {
   int jobs = 1;     ///< trials at once
   int threads = 1;  ///< of each
+  /// A search that asks: new trials of the folder, by us or by others, once nothing else waits;
+  /// none: there are no more.
+  std::function<std::vector<TrialEntry>()> ask = {};
 };
 
 struct PoolOutcome {
@@ -29,6 +36,14 @@ PoolOutcome run_pool(const SweepDir& dir, const PoolOptions& options);
 /// Returns the process. WorkError.
 int spawn_self(const std::vector<std::string>& arguments, const std::string& output, bool own_group,
                int errors = -1);
+
+/// The process that started us, `pid`, is the one that judges what we do: when it ends, however it
+/// ends, or has ended already, we get SIGTERM.
+void end_with(int pid);
+
+/// This program with these words in a process of its own; what it says is passed on to standard
+/// error. Throws what ended it; `doing`: "planning".
+void run_self(const std::vector<std::string>& words, const std::string& doing);
 
 /// `restage sweep plan ARGUMENTS --out DIR` in a process of its own: planning reads data and builds
 /// models, and takes that memory with it. Throws what ended it.

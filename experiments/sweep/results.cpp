@@ -188,13 +188,22 @@ TrialResult parse_result(const SortedJson& document, const std::string& path,
   if (!reader.at(document, "seconds").is_null()) out.seconds = reader.number(document, "seconds");
   out.host = reader.optional_text(document, "host");
   out.command = reader.optional_text(document, "command");
+  if (!reader.at(document, "told").is_null()) out.told = reader.number(document, "told");
   out.early_stop = reader.at(document, "early_stop");
   if (out.state != TrialState::done) return out;
   if (!reader.at(document, "training").is_null())
     for (const auto& [name, stage] : reader.section(document, "training").items())
       out.training.emplace(name, reader.stage(stage));
-  for (const auto& [name, set] : reader.section(document, "metrics").items())
-    out.sets.emplace_back(name, reader.set(set));
+  out.sets = parse_sets(reader.section(document, "metrics"), path, kFix);
+  return out;
+}
+
+std::vector<std::pair<std::string, SetResult>> parse_sets(const SortedJson& metrics,
+                                                          const std::string& path,
+                                                          const std::string& mend) {
+  const ResultReader reader(path, mend);
+  std::vector<std::pair<std::string, SetResult>> out;
+  for (const auto& [name, set] : metrics.items()) out.emplace_back(name, reader.set(set));
   return out;
 }
 

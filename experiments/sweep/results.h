@@ -49,8 +49,9 @@ struct TrialResult : sweep::TrialEntry {
   bool described = true;   ///< false: neither plan nor result says more than the id
   std::string error = {};  ///< of a failed one
   double seconds = 0;
-  std::string host = {}, command = {};                       ///< where and how it was made
-  nlohmann::json early_stop = nullptr;                       ///< the rule that stopped it
+  std::string host = {}, command = {};  ///< where and how it was made
+  std::optional<double> told = {};      ///< what 'sweep tell' said that it came to
+  nlohmann::json early_stop = nullptr;  ///< the rule that stopped it
   std::vector<std::pair<std::string, SetResult>> sets = {};  ///< of one that is done
   std::map<std::string, StageCurves> training = {};          ///< by stage; older results have none
 };
@@ -67,6 +68,11 @@ TrialResult read_result(const std::string& path, const std::string& id);
 /// The same of a document that was read from `path` already.
 TrialResult parse_result(const nlohmann::json& document, const std::string& path,
                          const std::string& id);
+/// The sets of a section "metrics" of the document `path`, as results hold them. InputError with
+/// the words `mend`: damaged.
+std::vector<std::pair<std::string, SetResult>> parse_sets(const nlohmann::json& metrics,
+                                                          const std::string& path,
+                                                          const std::string& mend);
 /// All trials of a sweep. InputError: `dir` holds no sweep. ReadError: a file of it cannot be read,
 /// which says nothing about its trial.
 Results read_results(const std::string& dir);

@@ -1,9 +1,11 @@
 #include <fcntl.h>
 #include <spawn.h>
+#include <sys/prctl.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <cerrno>
+#include <csignal>
 #include <cstring>
 
 #include "autograd/base/atomic_file.h"
@@ -85,18 +87,42 @@ int spawn_self(const std::vector<std::string>& arguments, const std::string& out
     posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETPGROUP);
     posix_spawnattr_setpgroup(&attributes, 0);
   }
+  std::vector<std::string> given = words_to_start();
+  const std::string program = given.front();
+  if (given.size() == 1) given.front() = arguments.front();  // "restage"
+  given.insert(given.end(), arguments.begin() + 1, arguments.end());
   std::vector<char*> words;
-  for (const std::string& argument : arguments)
-    words.push_back(const_cast<char*>(argument.c_str()));
+  for (std::string& word : given) words.push_back(word.data());
   words.push_back(nullptr);
   pid_t pid = 0;
-  const int code =
-      posix_spawn(&pid, program_to_start().c_str(), &files, &attributes, words.data(), environ);
+  const int code = posix_spawn(&pid, program.c_str(), &files, &attributes, words.data(), environ);
   posix_spawn_file_actions_destroy(&files);
   posix_spawnattr_destroy(&attributes);
   if (code != 0)
     throw WorkError(std::string("a process could not be started (") + std::strerror(code) + ")");
   return pid;
+}
+
+void end_with(int pid) {
+  // The kernel watches the thread that started us: the one that waits for us until we have ended.
+  ::prctl(PR_SET_PDEATHSIG, SIGTERM);
+  if (::getppid() != pid) ::raise(SIGTERM);
+}
+
+void run_self(const std::vector<std::string>& words, const std::string& doing) {
+  Pipe errors;
+  const int pid = spawn_self(words, "", false, errors.write);
+  errors.close_writer();
+  const std::string last = pass_on(errors.read);
+  int status = 0;
+  while (::waitpid(pid, &status, 0) < 0)
+    if (errno != EINTR) throw WorkError("how " + doing + " ended was not told; let SIGCHLD be");
+  if (!WIFEXITED(status))
+    throw WorkError(doing + " was killed by signal " + std::to_string(WTERMSIG(status)));
+  const int code = WEXITSTATUS(status);
+  if (code == 0) return;
+  if (code == 2 && !last.empty()) throw InputError::of_line(last);
+  throw Error(last.empty() ? doing + " ended with exit code " + std::to_string(code) : last, code);
 }
 
 void plan_in_a_process(const std::string& dir, const std::vector<std::string>& arguments,
@@ -105,19 +131,7 @@ void plan_in_a_process(const std::string& dir, const std::vector<std::string>& a
       "restage", "sweep", "plan", "--out", dir, "--threads", std::to_string(threads())};
   if (quiet) words.emplace_back("--quiet");
   words.insert(words.end(), arguments.begin(), arguments.end());
-  Pipe errors;
-  const int pid = spawn_self(words, "", false, errors.write);
-  errors.close_writer();
-  const std::string last = pass_on(errors.read);
-  int status = 0;
-  while (::waitpid(pid, &status, 0) < 0)
-    if (errno != EINTR) throw WorkError("how planning ended was not told; let SIGCHLD be");
-  if (!WIFEXITED(status))
-    throw WorkError("planning was killed by signal " + std::to_string(WTERMSIG(status)));
-  const int code = WEXITSTATUS(status);
-  if (code == 0) return;
-  if (code == 2 && !last.empty()) throw InputError::of_line(last);
-  throw Error(last.empty() ? "planning ended with exit code " + std::to_string(code) : last, code);
+  run_self(words, "planning");
 }
 
 }  // namespace restage::sweep

@@ -2,6 +2,7 @@
 
 #include <chrono>
 #include <cmath>
+#include <deque>
 #include <filesystem>
 #include <fstream>
 #include <set>
@@ -11,6 +12,7 @@
 #include "autograd/base/host.h"
 #include "autograd/base/interrupt.h"
 #include "autograd/base/nearest.h"
+#include "autograd/base/words.h"
 #include "nn/config/config_reader.h"
 
 namespace restage::sweep {
@@ -77,6 +79,7 @@ std::string resolved(const SweepFile& file, const std::string& dir) {
     put(cases, one.name, std::move(node));
   }
   if (!cases.children.empty()) put(root, "cases", std::move(cases));
+  if (file.search) put(root, "search", search_node(*file.search));
   for (const Exclusion& exclusion : file.exclude) append(exclude, settings_node(exclusion.values));
   if (!exclude.children.empty()) put(root, "exclude", std::move(exclude));
   for (const uint64_t seed : file.seeds) append(seeds, config_detail::write_leaf(seed));
@@ -100,6 +103,11 @@ std::string resolved(const SweepFile& file, const std::string& dir) {
   return "# made from " + file.path + " and " + file.base + "\n" + config_to_yaml(root);
 }
 
+std::optional<SearchRule> search_rule(const SweepFile& file) {
+  if (!file.search) return std::nullopt;
+  return SearchRule{file.search->kind, file.search->metric, file.search->trials};
+}
+
 using Files = std::vector<std::pair<std::string, std::string>>;  // path, content
 
 /// Those that do not hold this already.
@@ -119,16 +127,6 @@ void remove_drafts_of(const fs::path& target) {
   const std::string prefix = target.filename().string() + ".part";
   for (const auto& entry : fs::directory_iterator(target.parent_path(), ignored))
     if (entry.path().filename().string().starts_with(prefix)) fs::remove(entry.path(), ignored);
-}
-
-/// Waits for another process that plans in this folder.
-Lease planning(const std::string& dir) {
-  const StopScope stop;
-  while (true) {
-    if (auto lease = Lease::take(dir + "/lease", "planning")) return std::move(*lease);
-    throw_if_stopped();
-    std::this_thread::sleep_for(std::chrono::milliseconds(50));
-  }
 }
 
 }  // namespace
@@ -157,6 +155,7 @@ int write_sweep_dir(const std::string& dir, const SweepFile& file, const SweepPl
                    file.evaluate,
                    file.retries,
                    file.early_stop,
+                   search_rule(file),
                    {}};
   std::set<std::string> ids;
   Files files;
@@ -168,9 +167,17 @@ int write_sweep_dir(const std::string& dir, const SweepFile& file, const SweepPl
     written.trials.push_back(entry_of(trial));
   }
   files.emplace_back(dir + "/sweep.yaml", resolved(file, dir));
+  const Files sweep_file = {files.back()};
   files.emplace_back(dir + "/plan.json", plan_file_text(written));
   if (!new_ones(files).empty()) {
-    Lease lease = planning(dir);
+    Lease lease = lease_plan(dir);
+    if (written.search && written.search->asks() && new_ones(sweep_file).empty()) {
+      // Others may have asked for trials of the same sweep while we planned.
+      if (const auto now = read_plan_file(dir))
+        for (const TrialEntry& trial : now->trials)
+          if (ids.insert(trial.id).second) written.trials.push_back(trial);
+      files.back().second = plan_file_text(written);
+    }
     for (const auto& [path, content] : new_ones(files)) {
       remove_drafts_of(path);
       write_file_atomically(path, content);
@@ -183,6 +190,24 @@ int write_sweep_dir(const std::string& dir, const SweepFile& file, const SweepPl
   return stale;
 }
 
+Lease lease_plan(const std::string& dir) {
+  const StopScope stop;
+  while (true) {
+    if (auto lease = Lease::take(dir + "/lease", "planning")) return std::move(*lease);
+    throw_if_stopped();
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  }
+}
+
+void add_trial(const SweepDir& dir, const PlannedTrial& trial) {
+  make_folder(dir.folder(trial.id));
+  write_file_atomically(dir.folder(trial.id) + "/config.yaml", trial.config_yaml);
+  PlanFile plan = dir;
+  plan.trials.push_back(entry_of(trial));
+  remove_drafts_of(dir.path + "/plan.json");
+  write_file_atomically(dir.path + "/plan.json", plan_file_text(plan));
+}
+
 SweepDir read_sweep_dir(const std::string& dir) {
   std::optional<PlanFile> plan = read_plan_file(dir);
   if (!plan)
@@ -191,6 +216,19 @@ SweepDir read_sweep_dir(const std::string& dir) {
   SweepDir out{std::move(*plan), dir};
   while (out.path.size() > 1 && out.path.back() == '/') out.path.pop_back();
   return out;
+}
+
+SweepDir enter_sweep_dir(const std::string& path) {
+  SweepDir dir = read_sweep_dir(path);
+  dir.path = fs::absolute(dir.path).lexically_normal().string();
+  while (dir.path.size() > 1 && dir.path.back() == '/') dir.path.pop_back();
+  std::error_code error;
+  fs::current_path(fs::path(dir.path) / dir.directory, error);
+  if (error)
+    throw InputError(path,
+                     "the folder that it was planned from is not there (" + dir.directory + ")",
+                     "plan it again");
+  return dir;
 }
 
 std::optional<tables::TrialResult> read_result(const SweepDir& dir, const std::string& id) {
@@ -217,6 +255,7 @@ void write_result(const SweepDir& dir, const TrialEntry& trial, TrialState state
                    {"seconds", std::round(1e3 * seconds) / 1e3},
                    {"host", host_name()},
                    {"command", "restage trial " + dir.path + " " + trial.id}});
+  if (outcome.told) document["told"] = *outcome.told;
   if (early) document["early_stop"] = early_stop_json(dir.early_stop);
   write_file_atomically(dir.result(trial.id),
                         document.dump(1, ' ', false, Json::error_handler_t::replace) + "\n");
@@ -267,17 +306,28 @@ std::string stop_token(const std::string& dir) {
   return is_there(dir + "/stop") ? read_file(dir + "/stop") : "";
 }
 
-std::string last_line(const std::string& path) {
-  constexpr std::streamoff kTail = 4096;
-  constexpr size_t kLongest = 300;
+std::string last_lines(const std::string& path, int most) {
+  constexpr std::streamoff kTailOfLine = 4096;
   std::ifstream file(path, std::ios::binary | std::ios::ate);
   if (!file) return "";
-  const std::streamoff size = file.tellg();
-  file.seekg(std::max<std::streamoff>(0, size - kTail));
-  std::string line, last;
-  while (std::getline(file, line))
-    if (line.find_first_not_of(" \t\r") != std::string::npos) last = line;
-  return last.substr(0, kLongest);
+  const std::streamoff size = file.tellg(), tail = kTailOfLine * most;
+  file.seekg(std::max<std::streamoff>(0, size - tail));
+  std::deque<std::string> lines;
+  for (std::string line; std::getline(file, line);)
+    if (line.find_first_not_of(" \t\r") != std::string::npos) lines.push_back(line);
+  while (std::ssize(lines) > most) lines.pop_front();
+  return joined(lines, {}, "\n");
+}
+
+std::string last_line(const std::string& path) {
+  constexpr size_t kLongest = 300;
+  return last_lines(path, 1).substr(0, kLongest);
+}
+
+SweepFile read_planned_file(const SweepDir& dir) {
+  SweepFile file = read_sweep_file(dir.path + "/sweep.yaml");
+  file.store = dir.store;
+  return file;
 }
 
 }  // namespace restage::sweep

@@ -37,8 +37,15 @@ struct SweepDir : PlanFile {
 /// Returns how many trials of earlier plans stay in it unused.
 /// InputError: `dir` is a folder of something else.
 int write_sweep_dir(const std::string& dir, const SweepFile& file, const SweepPlan& plan);
+/// Adds a trial to the folder's plan. The caller holds lease_plan().
+void add_trial(const SweepDir& dir, const PlannedTrial& trial);
+/// The right to change the plan; waits for another process that has it.
+Lease lease_plan(const std::string& dir);
 /// InputError: no sweep's folder.
 SweepDir read_sweep_dir(const std::string& dir);
+/// The same, and goes to the folder that the sweep was planned from: there relative paths in
+/// configurations begin, wherever an engine starts us. `path` comes back absolute.
+SweepDir enter_sweep_dir(const std::string& dir);
 
 /// What a trial came to; nothing if it is not over. What is damaged, or is of another trial, counts
 /// as not there. ReadError if the bytes cannot be had: the trial may be over.
@@ -72,5 +79,10 @@ std::string stop_token(const std::string& dir);
 
 /// The last line of a file that is not blank, at most 300 characters; "" without one.
 std::string last_line(const std::string& path);
+/// The last lines of a file that are not blank, up to `most`; "" without any.
+std::string last_lines(const std::string& path, int most);
+/// The sweep file that the folder was planned from, resolved. The working directory must be the one
+/// that enter_sweep_dir() goes to.
+SweepFile read_planned_file(const SweepDir& dir);
 
 }  // namespace restage::sweep

@@ -11,6 +11,7 @@
 #include "autograd/base/words.h"
 #include "experiments/shipped_config.h"
 #include "experiments/sweep/sweep_words.h"
+#include "nn/config/config.h"
 #include "nn/config/config_reader.h"
 
 namespace restage::sweep {
@@ -19,9 +20,9 @@ namespace {
 namespace fs = std::filesystem;
 using Kind = ConfigNode::Kind;
 
-const std::vector<std::string> kKeys = {"name",     "base",    "set",       "grid",
-                                        "zip",      "cases",   "exclude",   "seeds",
-                                        "evaluate", "retries", "early_stop"};
+const std::vector<std::string> kKeys = {"name",    "base",       "set",     "grid",  "zip",
+                                        "cases",   "search",     "exclude", "seeds", "evaluate",
+                                        "retries", "early_stop", "python"};
 
 [[noreturn]] void fail(const ConfigPlace& place, const std::string& wrong, const std::string& fix) {
   throw InputError(place.text(), wrong, fix);
@@ -43,15 +44,6 @@ void check_keys(const ConfigNode& map, const std::vector<std::string>& known) {
   }
 }
 
-void check_key(const std::string& key, const ConfigPlace& place) {
-  bool good = !key.empty() && key.front() != '.' && key.back() != '.' &&
-              key.find("..") == std::string::npos;
-  for (const char c : key)
-    good = good &&
-           (std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_' || c == '.' || c == '-');
-  if (!good) fail(place, in_quotes(key) + " is no key of a configuration", "write section.key");
-}
-
 /// Every value below `node` with its dotted key; sections are opened.
 void flatten(const ConfigNode& node, const std::string& prefix, Settings& out) {
   for (const ConfigNode& entry : node.children) {
@@ -60,7 +52,7 @@ void flatten(const ConfigNode& node, const std::string& prefix, Settings& out) {
       flatten(entry, key + ".", out);
       continue;
     }
-    check_key(key, entry.key_place);
+    check_config_key(key, entry.key_place);
     for (const Setting& other : out)
       if (other.key == key)
         fail(entry.key_place,
@@ -188,6 +180,7 @@ class SweepReader {
     read_base();
     if (const auto* node = tree_.find("set"))
       out_.set = settings_of(*node, "a section of 'key: value' lines");
+    if (const auto* node = tree_.find("python")) read_python(*node);
     read_axes();
     read_cases();
     if (const auto* node = tree_.find("exclude")) {
@@ -198,6 +191,7 @@ class SweepReader {
         out_.exclude.push_back(std::move(exclusion));
       }
     }
+    if (const auto* node = tree_.find("search")) out_.search = search_of(*node);
     if (const auto* node = tree_.find("seeds")) out_.seeds = seeds_of(*node);
     if (const auto* node = tree_.find("evaluate")) out_.evaluate = evaluate_of(*node);
     if (const auto* node = tree_.find("retries"))
@@ -232,6 +226,16 @@ class SweepReader {
            "give a path relative to the sweep file, or the name of a configuration that comes with "
            "the program");
     return out;
+  }
+
+  /// Files that lie beside the sweep's become a setting of all trials.
+  void read_python(ConfigNode files) {
+    need(files, Kind::list, "a list of files such as [mine.py]");
+    for (ConfigNode& file : files.children) file.text = seen_from(out_.path, file.text);
+    for (const Setting& setting : out_.set)
+      if (setting.key == "python")
+        fail(files.key_place, "'python' stands here and in 'set'", "keep one of the two");
+    out_.set.push_back({"python", std::move(files)});
   }
 
   void read_axes() {
@@ -334,6 +338,32 @@ void add_evaluate(SweepFile& file, const std::vector<SweepWord>& words) {
   file.evaluate = evaluate_of(node);
 }
 
+void add_search(SweepFile& file, const SweepWord& word) {
+  const ConfigPlace place{"override " + in_quotes(word.text), 0, 0};
+  if (!file.search)
+    fail(place, "is about a search, and " + file.path + " has none", "add 'search' there");
+  if (word.several) fail(place, "has several values", "give one");
+  set_search_key(*file.search, word.key.substr(word.key.find('.') + 1), word.values[0], place);
+}
+
+/// The search that a range of the command line belongs to.
+void add_range(SweepFile& file, const SweepWord& word) {
+  const ConfigPlace place{"override " + in_quotes(word.text), 0, 0};
+  check_config_key(word.key, place);
+  if (!file.search) {
+    file.search.emplace();
+    file.search->kind = "random";
+    file.search->place = file.search->metric_place = place;
+  }
+  search::Dimension added = range_of_word(word.key, word.range, word.values, place);
+  std::erase_if(file.search->space, [&](const auto& one) { return one.key == word.key; });
+  file.search->space.push_back(std::move(added));
+  std::erase_if(file.set, [&](const Setting& setting) { return setting.key == word.key; });
+  std::erase_if(file.axes, [&](const Axis& axis) {
+    return axis.keys.size() == 1 && axis.keys[0] == word.key;
+  });
+}
+
 /// Lays one argument over the file: it wins over `set` and over an axis of its own, but not over
 /// what moves together with others.
 void add_argument(SweepFile& file, const SweepWord& word) {
@@ -363,7 +393,7 @@ void add_argument(SweepFile& file, const SweepWord& word) {
     file.seeds = seeds_of(list);
     return;
   }
-  check_key(word.key, place);
+  check_config_key(word.key, place);
   const auto says = [&](const Case& one) {
     return std::any_of(one.settings.begin(), one.settings.end(),
                        [&](const Setting& setting) { return setting.key == word.key; });
@@ -374,6 +404,11 @@ void add_argument(SweepFile& file, const SweepWord& word) {
   if (word.several && std::any_of(file.cases.begin(), file.cases.end(), says))
     fail(place, "has values, but a case of " + file.path + " says it", "change it there");
   std::erase_if(file.set, [&](const Setting& setting) { return setting.key == word.key; });
+  if (file.search) {
+    std::erase_if(file.search->space, [&](const auto& one) { return one.key == word.key; });
+    if (file.search->space.empty())
+      fail(place, "leaves nothing to search", "use a sweep file without 'search'");
+  }
   for (auto axis = file.axes.begin(); axis != file.axes.end(); ++axis) {
     if (std::find(axis->keys.begin(), axis->keys.end(), word.key) == axis->keys.end()) continue;
     if (axis->keys.size() > 1)
@@ -403,18 +438,36 @@ bool as_number(const ConfigNode& node, double& value) {
 SweepFile read_sweep_file(const std::string& path, const std::vector<std::string>& arguments) {
   SweepFile file = SweepReader(path).read();
   std::set<std::string> seen;
-  std::vector<SweepWord> evaluate;
+  std::vector<SweepWord> evaluate, search;
   for (const std::string& argument : arguments) {
     const SweepWord word = read_sweep_word(argument);
     if (!seen.insert(word.key).second)
       fail({"override " + in_quotes(argument), 0, 0}, "gives the key a second time", "keep one");
     if (word.key.starts_with("evaluate."))
       evaluate.push_back(word);
+    else if (word.key.starts_with("search."))
+      search.push_back(word);
+    else if (!word.range.empty())
+      add_range(file, word);
     else
       add_argument(file, word);
   }
   add_evaluate(file, evaluate);
+  // What other keys may be is said by the kind.
+  std::stable_partition(search.begin(), search.end(),
+                        [](const SweepWord& word) { return word.key == "search.kind"; });
+  for (const SweepWord& word : search) add_search(file, word);
+  if (file.search) check_search(file);
   return file;
+}
+
+void check_config_key(const std::string& key, const ConfigPlace& place) {
+  bool good = !key.empty() && key.front() != '.' && key.back() != '.' &&
+              key.find("..") == std::string::npos;
+  for (const char c : key)
+    good = good &&
+           (std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_' || c == '.' || c == '-');
+  if (!good) fail(place, in_quotes(key) + " is no key of a configuration", "write section.key");
 }
 
 bool same_value(const ConfigNode& a, const ConfigNode& b) {

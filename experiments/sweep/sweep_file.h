@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "experiments/sweep/search_section.h"
 #include "nn/config/config_tree.h"
 
 namespace restage::sweep {
@@ -66,7 +67,8 @@ struct SweepFile {
   std::vector<Axis> axes;            ///< grid, then zip; they multiply
   std::vector<Case> cases;           ///< at least one
   std::vector<Exclusion> exclude;
-  std::vector<uint64_t> seeds;  ///< empty: the base's own
+  std::optional<Search> search;  ///< its points multiply with the axes
+  std::vector<uint64_t> seeds;   ///< empty: the base's own
   Evaluate evaluate;
   int retries = 0;  ///< further attempts of a trial that failed
   std::optional<EarlyStop> early_stop;
@@ -76,10 +78,13 @@ struct SweepFile {
 /// `key=range(start,stop,step)` (stop left out) give or replace an axis, `key=value` a setting of
 /// all trials. Quotes keep a comma. `seed=` and `seeds=` give the seeds, `store=` the store,
 /// `base=` another configuration (seen from the working directory),
-/// `evaluate.benchmark=` and `evaluate.sets=` what trials are measured on.
+/// `evaluate.benchmark=` and `evaluate.sets=` what trials are measured on, `search.trials=` and the
+/// like what is searched; `key=uniform(a,b)` and the like search a key, `key=value` fixes it.
 /// InputError: one line with file and line.
 SweepFile read_sweep_file(const std::string& path, const std::vector<std::string>& arguments = {});
 
+/// InputError at `place` if this is no dotted key of a configuration.
+void check_config_key(const std::string& key, const ConfigPlace& place);
 /// The same value: numbers by their value, all else by text.
 bool same_value(const ConfigNode& a, const ConfigNode& b);
 /// The value as YAML on one line.

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <cstdio>
 
+#include "experiments/search/space.h"
+
 namespace restage::sweep {
 namespace {
 
@@ -95,10 +97,14 @@ SweepWord read_sweep_word(const std::string& text) {
     values = range_values(inside, place);
     word.several = true;
   } else {
-    word.several = inside_of(value, "choice", inside);
+    for (const char* name : search::kDimensionKinds)
+      if (name != std::string("choice") && inside_of(value, name, inside)) word.range = name;
+    word.several = inside_of(value, "choice", inside) || !word.range.empty();
     values = cut(word.several ? inside : value);
     word.several = word.several || values.size() > 1;
   }
+  if (!word.range.empty() && values.size() != 2)
+    throw InputError(place, word.range + "() needs two ends", "write " + word.range + "(low,high)");
   for (const std::string& one : values) {
     if (word.several && trimmed(one).empty())
       throw InputError(place, "has an empty value", "take a comma away, or write ''");

@@ -1,5 +1,6 @@
-// Words of the command line that vary a configuration: key=value, key=a,b, key=choice(a,b) and
-// key=range(start,stop,step).
+// Words of the command line that vary a configuration: key=value, key=a,b, key=choice(a,b),
+// key=range(start,stop,step), and the ranges of a search: key=uniform(a,b), log_uniform, integer
+// and log_integer.
 #pragma once
 
 #include <string>
@@ -13,6 +14,7 @@ struct SweepWord {
   std::string text, key;
   std::vector<ConfigNode> values;  ///< YAML each, placed at "override 'text'"
   bool several = false;            ///< an axis (also one of a single value: choice(a))
+  std::string range = {};          ///< "uniform" and the like, whose two ends are the values
 };
 
 /// A comma inside quotes, brackets or braces divides nothing. range() leaves `stop` out and may

@@ -292,9 +292,16 @@ void fill_set(const std::vector<Group>& groups, size_t set, Table* table) {
 /// What a reader of differences must know.
 void tell_few(Table* table) {
   constexpr int kEnoughSeeds = 5;
-  std::vector<std::string> few;
-  for (const Row& row : table->rows)
+  std::vector<std::string> few, two;
+  for (const Row& row : table->rows) {
+    if (!row.reference && row.n == 2) two.push_back(row.label);
     if (!row.reference && row.n > 0 && row.n < kEnoughSeeds) few.push_back(row.label);
+  }
+  if (!two.empty())
+    table->notices.push_back(
+        "two trials stand behind " + quoted_list(two) +
+        ": with n = 2 an interval rests on a single difference and is so wide (12.7 standard "
+        "errors of the seeds) that it says little; add a third seed at least");
   if (table->against && !few.empty())
     table->notices.push_back("fewer than five trials stand behind " + quoted_list(few) +
                              ": small differences cannot be told; add seeds=1,2,3,4,5");

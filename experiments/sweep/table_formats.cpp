@@ -102,6 +102,12 @@ std::string note() {
          "sequences]";
 }
 
+/// A file is read without what the command says beside it.
+std::string with_notices(const Table& table, std::string text) {
+  for (const std::string& notice : table.notices) text += "\n" + on_one_line(notice) + "\n";
+  return text;
+}
+
 // ---- CSV ---------------------------------------------------------------------------------------
 
 std::string for_csv(const std::string& text) {
@@ -378,7 +384,7 @@ Json to_json(const Table& table, const Results& results) {
 
 std::string to_format(const Table& table, const Results& results, const std::string& path) {
   const std::string ending = path.substr(std::min(path.size(), path.find_last_of('.')));
-  if (ending == ".md") return to_markdown(table, results);
+  if (ending == ".md") return with_notices(table, to_markdown(table, results));
   if (ending == ".csv") return to_csv(table);
   if (ending == ".tex") return to_tex(table, results);
   if (ending == ".svg") return to_svg(table);

@@ -31,21 +31,6 @@ bool is_standard_error(const std::string& path) {
          log.st_dev == error.st_dev && log.st_ino == error.st_ino;
 }
 
-/// Relative paths in configurations begin where the sweep was planned, wherever an engine starts
-/// us.
-SweepDir enter(const std::string& path) {
-  SweepDir dir = read_sweep_dir(path);
-  dir.path = fs::absolute(dir.path).lexically_normal().string();
-  while (dir.path.size() > 1 && dir.path.back() == '/') dir.path.pop_back();
-  std::error_code error;
-  fs::current_path(fs::path(dir.path) / dir.directory, error);
-  if (error)
-    throw InputError(path,
-                     "the folder that it was planned from is not there (" + dir.directory + ")",
-                     "plan it again");
-  return dir;
-}
-
 std::string busy(const std::string& id, const std::optional<LeaseHolder>& holder) {
   return "trial " + id + " is being run by " +
          (holder ? holder->text() : std::string("somebody who has just ended")) +
@@ -75,7 +60,7 @@ std::unique_ptr<TrainObserver> early_stopper(const SweepDir& dir, const TrialEnt
 
 void perform_stage(const std::string& path, const std::string& id, const std::string& stage,
                    bool quiet) {
-  const SweepDir dir = enter(path);
+  const SweepDir dir = enter_sweep_dir(path);
   const auto& artifacts = dir.trial(id).artifacts;
   const bool known = std::any_of(artifacts.begin(), artifacts.end(),
                                  [&](const auto& entry) { return entry.first == stage; });
@@ -89,7 +74,7 @@ void perform_stage(const std::string& path, const std::string& id, const std::st
 }
 
 TrialEnd perform_trial(const std::string& path, const std::string& id, bool quiet) {
-  const SweepDir dir = enter(path);
+  const SweepDir dir = enter_sweep_dir(path);
   const TrialEntry& trial = dir.trial(id);
   const auto over = [&] {
     const auto result = read_result(dir, id);

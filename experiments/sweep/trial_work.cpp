@@ -60,7 +60,9 @@ Json joints_json(const std::vector<std::vector<double>>& errors) {
   return out;
 }
 
-Json scores_json(const SystemScores& scores, const std::vector<std::string>& names) {
+}  // namespace
+
+Json set_json(const SystemScores& scores, const std::vector<std::string>& names) {
   Json out = evaluation_json(scores.model, names, scores.frames);
   for (const auto& [coverage, risk] :
        metrics::risk_coverage(scores.confidence, scores.frame_errors))
@@ -70,6 +72,8 @@ Json scores_json(const SystemScores& scores, const std::vector<std::string>& nam
     out["references"][name] = evaluation_json(reference, names, scores.frames);
   return out;
 }
+
+namespace {
 
 /// The run's own held-out data: a set for every condition that its stages can be judged on. The
 /// same sequences for every seed, so that trials can be compared sequence by sequence.
@@ -81,7 +85,7 @@ Json evaluate_held_out(const Bundle& models, const TrainConfig& config) {
   const auto names = sequence_names(how.sequences, test);
   Json out = Json::object();
   for (const auto& [name, scores] : evaluate_system(models, "the trial", test, how).conditions)
-    out[name] = scores_json(scores, names);
+    out[name] = set_json(scores, names);
   return out;
 }
 
@@ -105,7 +109,7 @@ Json evaluate_benchmark(const Bundle& models, const Evaluate& evaluate, const Tr
     std::vector<std::string> names;
     const SystemScores scores =
         evaluate_benchmark_set(models, evaluate.benchmark, set, how, &names);
-    out[set] = scores_json(scores, names);
+    out[set] = set_json(scores, names);
   }
   return out;
 }

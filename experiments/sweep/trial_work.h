@@ -6,10 +6,12 @@
 #include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "datasets/schema.h"
+#include "experiments/evaluation/evaluation.h"
 #include "experiments/sweep/sweep_file.h"
 #include "nn/config/config_tree.h"
 #include "train/forecast.h"
@@ -56,11 +58,16 @@ class TrialPlanner {
 /// Is it in the store, complete? Cheap.
 bool artifact_there(const std::string& store, const std::string& stage, const std::string& id);
 
+/// A set of sequences as TrialOutcome::metrics holds it.
+Json set_json(const SystemScores& scores, const std::vector<std::string>& names);
+
 struct TrialOutcome {
   std::map<std::string, std::string> artifacts;  ///< stage to id
   Json metrics = Json::object();  ///< {set: {"mean": {...}, "sequences": [{"name", ...}]}}
   /// {stage: {"steps", "batch", "curves": [{"figure", "points": [[step, value]]}]}}
   Json training = Json::object();
+  /// What somebody said that the trial came to ('sweep tell').
+  std::optional<double> told = {};
 };
 
 /// Trains what is missing in the store and evaluates. `id`: InputError if the trial is another one

@@ -1,4 +1,4 @@
-// A cloud that has just been captured, and where clouds wait for the system.
+// A cloud, or a line of joints, that has just been captured, and where it waits for the system.
 #pragma once
 
 #include <chrono>
@@ -20,7 +20,13 @@ struct LiveCloud {
   int64_t sender = 0;         ///< which connection it came by; another number is another sender
   size_t left_out = 0;        ///< points that were NaN or infinite
   std::string name;           ///< for messages, such as a file
+  /// A line of text in place of points: JSON, joints of a moment. Its time has not been read.
+  std::string line = {};
+  int64_t number = 0;  ///< of the line, from 1
 };
+
+/// What it is for people: "cloud" or "line".
+inline const char* what_of(const LiveCloud& cloud) { return cloud.line.empty() ? "cloud" : "line"; }
 
 /// Holds the newest cloud only: a cloud that arrives before the one before it was taken takes its
 /// place. One thread puts, another takes. Memory is that of the clouds that are held.

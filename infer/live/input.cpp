@@ -58,6 +58,14 @@ Sender::State Sender::read(std::span<unsigned char> buffer, Mailbox& to, Words& 
                            const std::string& name, const std::function<bool()>& heard) {
   const ssize_t got = ::read(fd, buffer.data(), buffer.size());
   if (got < 0 && (errno == EINTR || errno == EAGAIN)) return State::open;
+  const auto deliver = [&](LiveCloud& cloud) {
+    whole = true;
+    if (!heard()) return to.leave_out();
+    cloud.sender = number;
+    cloud.name = name;
+    to.put(cloud);
+  };
+  if (got == 0) parser.end(Clock::now(), deliver);
   if (got <= 0) {
     const std::string how = got < 0             ? std::string("broke off: ") + std::strerror(errno)
                             : parser.in_frame() ? "ended in the middle of a frame"
@@ -69,13 +77,6 @@ Sender::State Sender::read(std::span<unsigned char> buffer, Mailbox& to, Words& 
   const auto refuse = [&](const std::string& why) {
     to.refuse();
     words.warn("refused", "a frame of " + name + " was left out: " + why);
-  };
-  const auto deliver = [&](LiveCloud& cloud) {
-    whole = true;
-    if (!heard()) return to.leave_out();
-    cloud.sender = number;
-    cloud.name = name;
-    to.put(cloud);
   };
   const std::string garbage =
       parser.take(buffer.first(static_cast<size_t>(got)), Clock::now(), deliver, refuse);

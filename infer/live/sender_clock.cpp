@@ -52,10 +52,11 @@ void SenderClock::judge(const LiveCloud& cloud, Words& words) {
     return;
   }
   if (far_ == kHopeless)
-    words.warn("clock", format("the motion begins anew with every cloud: clouds lie %.3g s apart "
-                               "by their sender's clock, and %.3g s by ours; send 15 to 90 clouds "
-                               "a second, and their times in seconds",
-                               counted / far_, passed / far_));
+    words.warn("clock",
+               format("the motion begins anew with every %s: they lie %.3g s apart by their "
+                      "sender's clock, and %.3g s by ours; send 15 to 90 %ss a second, and their "
+                      "times in seconds",
+                      what_of(cloud), counted / far_, passed / far_, what_of(cloud)));
 }
 
 }  // namespace restage::live

@@ -26,6 +26,13 @@ class NearestPoint {
     tree_.knnSearch(p.data(), 1, &index, &squared);
     return {index, squared};
   }
+  /// The `count` nearest ones, the nearest first; all of them if there are fewer.
+  std::vector<uint32_t> nearest(const Vec3& p, size_t count) const {
+    std::vector<uint32_t> found(count);
+    std::vector<double> squared(count);
+    found.resize(tree_.knnSearch(p.data(), count, found.data(), squared.data()));
+    return found;
+  }
 
  private:
   struct Cloud {

@@ -7,6 +7,7 @@
 #include "autograd/base/parallel_each.h"
 #include "infer/render/sheet.h"
 #include "infer/render/srgb.h"
+#include "infer/render/stand.h"
 #include "infer/render/style.h"
 
 namespace restage {
@@ -43,6 +44,8 @@ Film::Film(const Clip& clip, const FilmOptions& options, std::vector<std::string
   const float a = radians(options.azimuth);
   const Point right(std::cos(a), 0, -std::sin(a));
   for (size_t f = 0; f < clip.frames.size(); ++f) {
+    before_ = std::max(before_,
+                       before_target(camera_at(centres_[f]), clip.frames[f], !clip.faces.empty()));
     const ClipReach reach = clip_reach(clip.frames[f], floor_);
     for (const Point& p : clip.frames[f]) {
       if (!p.allFinite()) continue;
@@ -50,15 +53,20 @@ Film::Film(const Clip& clip, const FilmOptions& options, std::vector<std::string
       high_ = std::max(high_, std::min(p.y() - floor_, reach.high));
     }
   }
-  const double per_metre = options.height / (1.16 * high_ + 0.12);
+  set_size();
+}
+
+void Film::set_size() {
+  const bool close = options_.close_up > 0;
+  const double per_metre = options_.height / (1.16 * high_ + 0.12);
   const int wide = static_cast<int>(per_metre * (2.0 * aside_ + 0.16));
   const int fitting =
-      close ? options.height : std::clamp(wide, options.height / 2, options.height * 16 / 9);
-  width_ = options.width > 0 ? options.width : (fitting + 1) / 2 * 2;
-  const int64_t pixels = int64_t{width_} * options.height;
-  samples_ = pixels > kMostSamples / 4                               ? 1
-             : pixels > (int64_t{1} << 20) || clip.frames.size() > 1 ? 2
-                                                                     : 3;
+      close ? options_.height : std::clamp(wide, options_.height / 2, options_.height * 16 / 9);
+  width_ = options_.width > 0 ? options_.width : (fitting + 1) / 2 * 2;
+  const int64_t pixels = int64_t{width_} * options_.height;
+  samples_ = pixels > kMostSamples / 4                                ? 1
+             : pixels > (int64_t{1} << 20) || clip_.frames.size() > 1 ? 2
+                                                                      : 3;
 }
 
 void Film::draw(const std::vector<size_t>& frames,
@@ -77,12 +85,23 @@ void Film::draw(const std::vector<size_t>& frames,
   }
 }
 
-Image Film::draw(const Points& points, const Point& centre) const {
-  Canvas canvas(width_, options_.height, samples_, style_);
+void Film::share(Film& a, Film& b) {
+  for (float Film::*extent : {&Film::high_, &Film::aside_, &Film::before_})
+    a.*extent = b.*extent = std::max(a.*extent, b.*extent);
+  for (Film* film : {&a, &b}) film->set_size();
+}
+
+Camera Film::camera_at(const Point& target) const {
   Camera camera;
   camera.azimuth = radians(options_.azimuth);
   camera.elevation = radians(options_.elevation);
-  camera.view = kView;
+  camera.target = target;
+  return camera;
+}
+
+Image Film::draw(const Points& points, const Point& centre) const {
+  Canvas canvas(width_, options_.height, samples_, style_);
+  Camera camera = camera_at(centre);
   const auto reach = static_cast<float>(options_.close_up);
   const float whole =
       std::max(1.16f * high_ + 0.12f, (2 * aside_ + 0.16f) * static_cast<float>(options_.height) /
@@ -90,9 +109,8 @@ Image Film::draw(const Points& points, const Point& centre) const {
   const float upright =
       std::max(1.0f, static_cast<float>(options_.height) / static_cast<float>(width_));
   const float tall = (reach > 0 ? 2 * reach * upright : whole) / static_cast<float>(options_.zoom);
-  camera.distance = 0.5f * tall / std::tan(0.5f * kView);
-  camera.target = centre;
   if (reach <= 0) camera.target.y() = floor_ + 0.5f * high_ - 0.01f * tall;
+  stand_outside(camera, tall, before_);
   canvas.begin(camera, floor_, points, clip_.faces);
   const Colour plain = colour_of(kClipColours[0]);
   if (clip_.faces.empty())

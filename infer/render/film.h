@@ -28,12 +28,18 @@ class Film {
   /// figure's materials that cannot be decoded.
   Film(const Clip& clip, const FilmOptions& options, std::vector<std::string>& remarks);
 
+  /// Both figures at one scale and by one camera, in pictures of one size: for films of the same
+  /// options.
+  static void share(Film& a, Film& b);
+
   int width() const { return width_; }
   int height() const { return options_.height; }
   /// Draws these frames, several at a time, and gives them in this order.
   void draw(const std::vector<size_t>& frames, const std::function<void(const Image&)>& take) const;
 
  private:
+  void set_size();
+  Camera camera_at(const Point& target) const;
   Image draw(const Points& points, const Point& centre) const;
   Canvas::Pictures pictures_;
   SceneStyle style_;
@@ -41,6 +47,7 @@ class Film {
   FilmOptions options_;
   int width_ = 0, samples_ = 2;
   std::vector<Point> centres_;
+  float before_ = 0;  ///< metres: how far the figure reaches from the centre to the camera
   float floor_ = 0, high_ = 0.5f, aside_ = 0.3f;  ///< metres: height, half the width of the figure
 };
 

@@ -250,6 +250,11 @@ std::string data_uri(const std::string& bytes) {
   return std::string("data:") + kind + ";base64," + base64(bytes.data(), bytes.size());
 }
 
+/// An element of the page that holds bytes.
+std::string script_data(const std::string& name, const void* bytes, size_t size) {
+  return "<script id=\"" + name + "\" type=\"text/plain\">" + base64(bytes, size) + "</script>\n";
+}
+
 struct Packed {
   Json meta;
   std::string elements;               ///< script elements that hold the data
@@ -305,8 +310,7 @@ Packed pack(const Clip& clip, const PageSurface& surface, const Plan& plan, size
       list.push_back(std::round(clip.confidence[f * plan.stride] * 1e3) / 1e3);
   }
   const auto element = [&](const char* name, const void* bytes, size_t size) {
-    packed.elements += "<script id=\"" + std::string(name) + std::to_string(number) +
-                       "\" type=\"text/plain\">" + base64(bytes, size) + "</script>\n";
+    packed.elements += script_data(name + std::to_string(number), bytes, size);
   };
   element("frames", data.data(), data.size() * 2);
   if (!surface.faces.empty()) element("faces", surface.faces.data(), surface.faces.size() * 12);
@@ -370,7 +374,8 @@ std::string page_html(const std::vector<Clip>& clips, const PageOptions& options
     width = std::max(width, packed.width);
     height = std::max(height, packed.height);
     const std::string label = escape_html(clips[c].label);
-    panels += "<div class=\"panel\" id=\"panel" + std::to_string(c) +
+    panels += std::string("<div class=\"panel") + (options.labels_below ? " below" : "") +
+              "\" id=\"panel" + std::to_string(c) +
               "\"><span><i style=\"background:" + hex(kClipColours[c]) + "\"></i>" + label +
               "<b></b></span>" + (clips[c].errors.empty() ? "" : error_legend(clips[c])) +
               "</div>\n";
@@ -381,6 +386,10 @@ std::string page_html(const std::vector<Clip>& clips, const PageOptions& options
   std::string notes;
   for (const std::string& note : options.notes) notes += "<p>" + escape_html(note) + "</p>\n";
   if (options.live) meta["live"] = true;
+  if (options.live && !options.live_vertex.empty()) {
+    meta["sent"] = options.sent;
+    data += script_data("taken0", options.live_vertex.data(), options.live_vertex.size() * 4);
+  }
   meta["width"] = width;
   meta["height"] = height;
   meta["clips"] = std::move(list);

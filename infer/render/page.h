@@ -15,10 +15,15 @@ struct PageOptions {
   /// surfaces get fewer vertices, then more frames are left out. The foot of the page says what was
   /// left out.
   size_t max_bytes = 30'000'000;
-  size_t max_points = 2048;  ///< of a cloud, in a frame
+  size_t max_points = 2048;   ///< of a cloud, in a frame
+  bool labels_below = false;  ///< labels stand under the clips, not over them
   /// The page shows the first frame, and then what its server sends (live/server.h): places of the
   /// one clip's vertices, of which none may have been left out.
   bool live = false;
+  /// Of a live page: of each vertex of the clip its vertex in what the server sends, which has
+  /// `sent` vertices; empty: they are the same.
+  std::vector<int32_t> live_vertex = {};
+  size_t sent = 0;
 };
 
 /// The page as text. Positions are stored as 16-bit fractions of the clip's bounding box; for a

@@ -149,7 +149,7 @@ void Canvas::draw_mesh(const Points& vertices, const std::vector<Triangle>& face
   for (size_t v = 0; v < vertices.size(); ++v) projected[v] = project(vertices[v]);
   for (const Triangle& f : faces) {
     const Projected corners[3] = {projected[f[0]], projected[f[1]], projected[f[2]]};
-    if (corners[0].z <= 0 || corners[1].z <= 0 || corners[2].z <= 0) continue;
+    if (!corners[0].in_front() || !corners[1].in_front() || !corners[2].in_front()) continue;
     const Point out = (vertices[f[1]] - vertices[f[0]]).cross(vertices[f[2]] - vertices[f[0]]);
     // In open surfaces, or where corners are listed the other way round, a triangle is seen from
     // behind. Such a triangle is lit as if it faced the camera.
@@ -192,7 +192,7 @@ std::vector<Canvas::Facet> Canvas::facets(const Points& vertices,
                           : 1.0f,
                       projected[f[0]].z + projected[f[1]].z + projected[f[2]].z};
     if (facet.side < 0 && !facet.material->two_sided) continue;
-    if (facet.corners[0].z > 0 && facet.corners[1].z > 0 && facet.corners[2].z > 0)
+    if (facet.corners[0].in_front() && facet.corners[1].in_front() && facet.corners[2].in_front())
       out.push_back(facet);
   }
   const auto solid = [](const Facet& facet) {
@@ -267,7 +267,7 @@ void Canvas::draw_cloud(const Points& points, const Colour& colour) {
       std::clamp(0.42f * std::sqrt(1.8f / static_cast<float>(points.size() + 1)), 0.004f, 0.016f);
   for (const Point& p : points) {
     const Projected c = project(p);
-    if (c.z <= 0) continue;
+    if (!c.in_front()) continue;
     const float radius = std::max(0.7f * static_cast<float>(samples_), focus_ * size / c.z);
     // The far side of a person can be seen between the spheres of the near side. The far side is
     // drawn paler, so that the near side looks like a surface.

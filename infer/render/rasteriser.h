@@ -3,6 +3,7 @@
 // soft shadows; the depth buffer gives ambient occlusion.
 #pragma once
 
+#include <cmath>
 #include <vector>
 
 #include "infer/render/image.h"
@@ -56,6 +57,8 @@ class Canvas {
     /// x and y: samples from the picture's upper left corner. z: metres before the camera; 0 or
     /// less for a point that cannot be seen.
     float x, y, z;
+    /// Whether it can be drawn: coordinates that are no numbers, or overflow, cannot.
+    bool in_front() const { return z > 0 && std::isfinite(x + y + z); }
   };
   Projected project(const Point& p) const;
   struct Facet;

@@ -6,6 +6,7 @@
 
 #include "autograd/base/format.h"
 #include "infer/render/rasteriser.h"
+#include "infer/render/stand.h"
 #include "infer/render/style.h"
 
 namespace restage {
@@ -25,6 +26,7 @@ struct Layout {
   // Extent that the scale has to leave room for, metres: half the width of the widest figure about
   // its centre, and the height of the tallest one over its floor.
   float half_width = 0.3f, high = 0.5f;
+  float before = 0;  // how far figures reach from their centre to the camera, metres
 };
 
 std::vector<size_t> moments_of(const std::vector<Clip>& clips, int columns) {
@@ -35,6 +37,13 @@ std::vector<size_t> moments_of(const std::vector<Clip>& clips, int columns) {
   for (size_t k = 0; k < count; ++k)
     moments.push_back(count == 1 ? length / 2 : k * (length - 1) / (count - 1));
   return moments;
+}
+
+Camera camera_of(const SheetOptions& options) {
+  Camera camera;
+  camera.azimuth = radians(options.azimuth);
+  camera.elevation = radians(options.elevation);
+  return camera;
 }
 
 Layout lay_out(const std::vector<Clip>& clips, const SheetOptions& options) {
@@ -51,6 +60,9 @@ Layout lay_out(const std::vector<Clip>& clips, const SheetOptions& options) {
       const Points& points = clip.frames[moment];
       const Point centre = options.close_up > 0 ? clip.focus.at(moment) : clip_centre(points);
       layout.cells.back().push_back({&points, centre});
+      Camera camera = camera_of(options);
+      camera.target = centre;
+      layout.before = std::max(layout.before, before_target(camera, points, !clip.faces.empty()));
       const ClipReach reach = clip_reach(points, floor);
       for (const Point& p : points) {
         if (!p.allFinite()) continue;
@@ -66,15 +78,12 @@ Layout lay_out(const std::vector<Clip>& clips, const SheetOptions& options) {
 Image draw_cell(const Clip& clip, const SheetFrame& frame, float floor, uint32_t colour, int width,
                 const Layout& layout, const SheetOptions& options) {
   Canvas canvas(width, options.cell_height);
-  Camera camera;
-  camera.azimuth = static_cast<float>(options.azimuth * std::numbers::pi / 180);
-  camera.elevation = static_cast<float>(options.elevation * std::numbers::pi / 180);
-  camera.view = kView;
+  Camera camera = camera_of(options);
   const auto reach = static_cast<float>(options.close_up);
   const float tall = reach > 0 ? 2 * reach : 1.16f * layout.high + 0.12f;
-  camera.distance = 0.5f * tall / std::tan(0.5f * kView);
   camera.target = frame.centre;
   if (reach <= 0) camera.target.y() = floor + 0.5f * layout.high - 0.01f * tall;
+  stand_outside(camera, tall, layout.before);
   canvas.begin(camera, floor, *frame.points, clip.faces);
   if (clip.faces.empty())
     canvas.draw_cloud(*frame.points, colour_of(colour));

@@ -198,6 +198,18 @@ void GlbWriter::measure_cut(const PosedSkeleton& posed) {
   }
 }
 
+void GlbWriter::set_morphs(GlbMorphs morphs) {
+  for (const auto& delta : morphs.deltas)
+    if (delta.size() != 3 * mesh_.vertices.size())
+      throw ShapeError("glb: a morph target of " + std::to_string(delta.size()) + " numbers for " +
+                       std::to_string(mesh_.vertices.size()) + " vertices");
+  if (morphs.weights.size() != morphs.deltas.size() * frames() ||
+      morphs.distance.size() != frames())
+    throw ShapeError("glb: weights and distances of morph targets for " + std::to_string(frames()) +
+                     " frames");
+  morphs_ = std::move(morphs);
+}
+
 std::string GlbWriter::bytes() const {
   Json root;
   root["asset"] = {{"version", "2.0"},
@@ -231,6 +243,14 @@ std::string GlbWriter::bytes() const {
         Json::array({glb::animation(buffer, tracks_, options_.clip, options_.fps)});
   if (!confidence_.empty()) root["animations"][0]["extras"]["confidence"] = confidence_;
   if (!filled_.empty()) root["animations"][0]["extras"]["filled"] = filled_;
+  if (morphs_ && frames() > 0) {
+    const size_t node = root["nodes"].size() - 1;
+    glb::add_morphs(buffer, *morphs_, frames(), node, root);
+    root["asset"]["extras"]["surface_error_mm"] = millimetres(morphs_->error);
+    Json& distances = root["animations"][0]["extras"]["distance_mm"] = Json::array();
+    for (const double d : morphs_->distance)
+      distances.push_back(d < 0 ? Json(nullptr) : Json(std::round(d * 1e5) / 1e2));
+  }
   buffer.describe(root);
   return glb_bytes(root.dump(), buffer.bytes(), path_);
 }

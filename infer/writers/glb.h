@@ -35,6 +35,17 @@ struct GlbOptions {
   std::string skeleton = "restage";  ///< one of rig_conventions()
 };
 
+/// What moves the surface besides its skin: morph targets, and their weights in every frame.
+struct GlbMorphs {
+  /// Of each target three numbers a vertex, from -127 to 127: metres times 127 for a weight of 1.
+  std::vector<std::vector<int8_t>> deltas;
+  std::vector<float> weights;  ///< of all targets in the first frame, then in the second, ...
+  DistanceSummary error;       ///< of the surface that they give, metres
+  /// Of each frame the median distance of its cloud's points from the surface, metres; less than 0:
+  /// it has no cloud.
+  std::vector<double> distance;
+};
+
 /// Collects poses and writes the file at commit(). The file holds 22 nodes or more, named and
 /// turned as GlbOptions::skeleton says (rig_convention.h), whose translations are the offsets of
 /// the rest joints. Rotations are unit quaternions, with signs
@@ -57,6 +68,9 @@ class GlbWriter {
   /// The numbers of the frames that have no cloud of the source behind them
   /// (RetargetedFrame::filled). The file holds the numbers in the animation's extras.
   void set_filled(std::vector<int64_t> frames) { filled_ = std::move(frames); }
+  /// For all frames, after the last push(). Targets are bytes (KHR_mesh_quantization), and the
+  /// weights an animation's channel. ShapeError if vertices or frames are others.
+  void set_morphs(GlbMorphs morphs);
   /// The file. Its `asset.extras` say fps, units and the influence error in millimetres.
   std::string bytes() const;
   /// Writes it.
@@ -80,6 +94,7 @@ class GlbWriter {
   SkinWeights lost_;  ///< the file's weights minus the given ones
   std::vector<double> confidence_;
   std::vector<int64_t> filled_;
+  std::optional<GlbMorphs> morphs_;
   Distances cut_error_, surface_error_;
 };
 

@@ -31,6 +31,16 @@ int Buffer::add(const void* data, size_t bytes, size_t count, Component componen
   return static_cast<int>(accessors_.size()) - 1;
 }
 
+int Buffer::add_bytes(const void* data, size_t count, const std::array<int, 3>& low,
+                      const std::array<int, 3>& high) {
+  const int accessor = add(data, count * 4, count, i8, "VEC3", vertices);
+  views_.back()["byteStride"] = 4;
+  accessors_.back()["normalized"] = true;
+  accessors_.back()["min"] = low;
+  accessors_.back()["max"] = high;
+  return accessor;
+}
+
 void Buffer::set_bounds(int accessor, const std::vector<float>& low,
                         const std::vector<float>& high) {
   accessors_[accessor]["min"] = low;
@@ -77,6 +87,39 @@ Joints placed_joints(const Json& nodes, const RigConvention& rig) {
     out[j] = j == 0 ? offset : Vec3(out[p] + rig.axes[p] * offset);
   }
   return out;
+}
+
+void add_morphs(Buffer& buffer, const GlbMorphs& morphs, size_t frames, size_t node, Json& root) {
+  if (morphs.deltas.empty()) return;
+  Json& primitive = root["meshes"][0]["primitives"][0];
+  Json names = Json::array();
+  for (const std::vector<int8_t>& delta : morphs.deltas) {
+    const size_t count = delta.size() / 3;
+    // Of four bytes each, as the format wants.
+    std::vector<std::array<int8_t, 4>> rows(count);
+    std::array<int, 3> low{127, 127, 127}, high{-127, -127, -127};
+    for (size_t i = 0; i < delta.size(); ++i) {
+      rows[i / 3][i % 3] = delta[i];
+      low[i % 3] = std::min<int>(low[i % 3], delta[i]);
+      high[i % 3] = std::max<int>(high[i % 3], delta[i]);
+    }
+    const int at = buffer.add_bytes(rows.data(), count, low, high);
+    primitive["targets"].push_back({{"POSITION", at}});
+    names.push_back("surface_" + std::to_string(names.size() + 1));
+  }
+  const size_t targets = morphs.deltas.size();
+  root["meshes"][0]["weights"] = std::vector<float>(targets, 0.0f);
+  root["meshes"][0]["extras"] = {{"targetNames", names}};
+  root["extensionsUsed"] = root["extensionsRequired"] = Json::array({"KHR_mesh_quantization"});
+  if (frames == 0) return;
+  const int output = buffer.add(morphs.weights.data(), morphs.weights.size() * 4,
+                                morphs.weights.size(), f32, "SCALAR", none);
+  Json& animation = root["animations"][0];
+  animation["channels"].push_back({{"sampler", animation["samplers"].size()},
+                                   {"target", {{"node", node}, {"path", "weights"}}}});
+  animation["samplers"].push_back({{"input", animation["samplers"][0]["input"]},
+                                   {"interpolation", "LINEAR"},
+                                   {"output", output}});
 }
 
 Json animation(Buffer& buffer, const Tracks& tracks, const std::string& name, double fps) {

@@ -7,13 +7,14 @@
 #include <string>
 #include <vector>
 
+#include "infer/writers/glb.h"
 #include "infer/writers/tracks.h"
 
 namespace restage::glb {
 
 using Json = nlohmann::ordered_json;
 
-enum Component { u8 = 5121, u32 = 5125, f32 = 5126 };
+enum Component { i8 = 5120, u8 = 5121, u32 = 5125, f32 = 5126 };
 enum Target { none = 0, vertices = 34962, indices = 34963 };
 
 /// The binary chunk of the file, with the buffer views and accessors that describe its content.
@@ -22,6 +23,10 @@ class Buffer {
   /// Adds `count` elements to the chunk and returns the number of their accessor.
   int add(const void* data, size_t bytes, size_t count, Component component, const char* type,
           Target target);
+  /// The same for `count` elements of three bytes and one that says nothing, -127 to 127, which
+  /// stand for -1 to 1; with their bounds.
+  int add_bytes(const void* data, size_t count, const std::array<int, 3>& low,
+                const std::array<int, 3>& high);
   /// Writes the least and the largest value into an accessor: the format wants that for positions
   /// and times.
   void set_bounds(int accessor, const std::vector<float>& low, const std::vector<float>& high);
@@ -41,6 +46,10 @@ int top_node(const RigConvention& rig);
 /// Where a program that adds up the nodes of nodes() puts the joints: the sums of what is in the
 /// file, which is rounded.
 Joints placed_joints(const Json& nodes, const RigConvention& rig);
+
+/// Adds the targets to the file's only mesh, and their weights to its only animation, which has
+/// `frames`. `node`: the mesh's.
+void add_morphs(Buffer& buffer, const GlbMorphs& morphs, size_t frames, size_t node, Json& root);
 
 /// LINEAR, at `fps`; only the root is translated.
 Json animation(Buffer& buffer, const Tracks& tracks, const std::string& name, double fps);

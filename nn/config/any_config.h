@@ -25,6 +25,10 @@ class AnyConfig {
   }
   ~AnyConfig() = default;
 
+  template <class C>
+  bool holds() const {
+    return dynamic_cast<const Held<C>*>(held_.get()) != nullptr;
+  }
   /// Error if it holds another type.
   template <class C>
   const C& as() const {

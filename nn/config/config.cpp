@@ -1,6 +1,7 @@
 #include "nn/config/config.h"
 
 #include <algorithm>
+#include <cstdlib>
 #include <filesystem>
 #include <system_error>
 
@@ -11,6 +12,48 @@ namespace {
 
 namespace fs = std::filesystem;
 
+/// The value of `${oc.env:NAME}` or `${oc.env:NAME,DEFAULT}`, given what stands in the braces.
+std::string environment(const std::string& inside, const std::string& where) {
+  constexpr std::string_view kStart = "oc.env:";
+  if (!inside.starts_with(kStart))
+    throw InputError(
+        where, "a value refers to " + in_quotes(inside) + ", and only to the environment it may",
+        "write the value itself, or ${oc.env:NAME} for a variable of the environment");
+  const size_t comma = std::min(inside.find(','), inside.size());
+  const std::string name = inside.substr(kStart.size(), comma - kStart.size());
+  const char* value = std::getenv(name.c_str());
+  if (value == nullptr && comma == inside.size())
+    throw InputError(where, "the environment has no variable " + in_quotes(name),
+                     "set it, or write ${oc.env:NAME,DEFAULT}");
+  const std::string out = value != nullptr ? value : inside.substr(comma + 1);
+  if (out.find("${") != out.npos)
+    throw InputError(where,
+                     (value != nullptr ? "the variable " : "the default of the variable ") +
+                         in_quotes(name) + " holds " + in_quotes(out) +
+                         ", and a reference in a reference is not looked up",
+                     "write a value without ${");
+  return out;
+}
+
+/// A value with variables of the environment put in, and ~/ as the home folder.
+std::string expanded(const std::string& text, const std::string& where) {
+  std::string out;
+  size_t at = 0;
+  for (size_t start; (start = text.find("${", at)) != text.npos;) {
+    const size_t end = text.find('}', start);
+    if (end == text.npos)
+      throw InputError(where, in_quotes(text) + " opens ${ and does not close it",
+                       "write ${oc.env:NAME}");
+    out += text.substr(at, start - at);
+    out += environment(text.substr(start + 2, end - start - 2), where);
+    at = end + 1;
+  }
+  out += text.substr(at);
+  if (const char* home = std::getenv("HOME"); home != nullptr && out.starts_with("~/"))
+    out.replace(0, 1, home);
+  return out;
+}
+
 /// Reads files and their includes; knows the chain of files that are open, to see a cycle.
 class Loader {
  public:
@@ -18,6 +61,8 @@ class Loader {
     std::error_code ignored;
     const fs::path canonical = fs::weakly_canonical(path, ignored);
     ConfigNode own = parse_yaml(read_file(path, kConfigMaxBytes), path);
+    if (ConfigNode* python = own.find("python"))
+      for (ConfigNode& file : python->children) file.text = seen_from(path, file.text);
     ConfigNode* include = own.find("include");
     if (include == nullptr) return grown(std::move(own));
 
@@ -43,13 +88,14 @@ class Loader {
     if (item.kind != ConfigNode::Kind::scalar)
       throw InputError(where, "'include' must be a file or a list of files",
                        "write 'include: other.yaml'");
-    const fs::path target = (fs::path(from).parent_path() / item.text).lexically_normal();
+    const std::string name = expanded(item.text, where);
+    const fs::path target = (fs::path(from).parent_path() / name).lexically_normal();
     std::error_code ignored;
     if (!fs::exists(target, ignored))
-      throw InputError(where, "the included file " + in_quotes(item.text) + " does not exist",
+      throw InputError(where, "the included file " + in_quotes(name) + " does not exist",
                        "give a path relative to the file that includes it");
     if (std::find(open_.begin(), open_.end(), fs::weakly_canonical(target, ignored)) != open_.end())
-      throw InputError(where, "including " + in_quotes(item.text) + " here makes a circle",
+      throw InputError(where, "including " + in_quotes(name) + " here makes a circle",
                        "remove one of the includes");
     if (++files_ > kConfigMaxFiles)
       throw InputError(where,
@@ -70,11 +116,22 @@ class Loader {
   int files_ = 0;
 };
 
+void expand(ConfigNode& node) {
+  if (node.kind == ConfigNode::Kind::scalar) node.text = expanded(node.text, node.place.text());
+  for (ConfigNode& child : node.children) expand(child);
+}
+
 }  // namespace
+
+std::string seen_from(const std::string& file, const std::string& name) {
+  if (name.empty() || name.starts_with("~/") || name.starts_with("${")) return name;
+  return (fs::path(file).parent_path() / name).lexically_normal().string();
+}
 
 ConfigNode load_config_tree(const std::string& path, const std::vector<std::string>& overrides) {
   ConfigNode tree = Loader().load(path);
   for (const auto& text : overrides) apply_override(tree, text);
+  expand(tree);
   return tree;
 }
 

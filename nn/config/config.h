@@ -20,9 +20,16 @@
 
 namespace restage {
 
+/// `name` as it is seen from the folder of `file`; absolute names, and those that begin with ~/ or
+/// a variable, stay as they are.
+std::string seen_from(const std::string& file, const std::string& name);
+
 /// Reads a file with its includes (`include: other.yaml` or a list, at the top level, relative to
 /// the including file; the file's own keys win, then later includes), then lays the overrides on
-/// it. Errors: a missing file, an include cycle, more than kConfigMaxFiles files, and those of
+/// it. In values, and names of included files, `${oc.env:NAME}` and `${oc.env:NAME,DEFAULT}` stand
+/// for variables of the environment, as in OmegaConf, and `~/` at the beginning for the home
+/// folder. The names in the list `python` are seen from the file, too. Errors: a missing file, an
+/// include cycle, a variable that holds `${` itself, more than kConfigMaxFiles files, and those of
 /// parse_yaml.
 ConfigNode load_config_tree(const std::string& path,
                             const std::vector<std::string>& overrides = {});

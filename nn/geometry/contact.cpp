@@ -88,4 +88,29 @@ void move_hand(const Joints& rest, int side, const Vec3& offset, Pose* pose) {
            offset, pose);
 }
 
+void turn_elbow(const Joints& rest, int side, const Vec3& place, Pose* pose) {
+  constexpr double kBent = 0.1;  // how far off the line an elbow is that turns fully, of the arm
+  const auto shoulder = static_cast<size_t>(kLeftShoulder + side),
+             elbow = static_cast<size_t>(kLeftElbow + side),
+             wrist = static_cast<size_t>(kLeftWrist + side);
+  const PosedSkeleton posed = forward_kinematics(rest, *pose);
+  const Vec3 arm = posed.joints[wrist] - posed.joints[shoulder];
+  if (!(arm.norm() > 1e-6)) return;
+  const Vec3 line = arm.normalized();
+  const auto across = [&](const Vec3& at) -> Vec3 {
+    const Vec3 from = at - posed.joints[shoulder];
+    return from - line.dot(from) * line;
+  };
+  const Vec3 now = across(posed.joints[elbow]), then = across(place);
+  if (!(now.norm() > 1e-6 && then.norm() > 1e-6)) return;
+  const double length = (posed.joints[elbow] - posed.joints[shoulder]).norm() +
+                        (posed.joints[wrist] - posed.joints[elbow]).norm();
+  const double share = std::min(1.0, now.norm() / (kBent * length));
+  const double angle = std::atan2(line.dot(now.cross(then)), now.dot(then));
+  const Mat3 turn = Eigen::AngleAxisd(share * angle, line).toRotationMatrix();
+  const auto parent = static_cast<size_t>(kParents[shoulder]);
+  pose->local[shoulder] = posed.global[parent].transpose() * turn * posed.global[shoulder];
+  pose->local[wrist] = (turn * posed.global[elbow]).transpose() * posed.global[wrist];
+}
+
 }  // namespace restage

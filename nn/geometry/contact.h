@@ -19,5 +19,9 @@ std::vector<std::array<bool, 2>> standing_feet(const std::vector<Joints>& perfor
 void move_foot(const Joints& rest, int side, const Vec3& offset, Pose* pose);
 /// The same of a hand: shoulder and elbow turn.
 void move_hand(const Joints& rest, int side, const Vec3& offset, Pose* pose);
+/// Turns the left (side 0) or right arm about the line from shoulder to wrist until its elbow is as
+/// near `place` (metres, in the world) as it comes. The hand stays where and as it is. The nearer
+/// an arm is to straight, the less it is turned: that would wring its skin and move nothing.
+void turn_elbow(const Joints& rest, int side, const Vec3& place, Pose* pose);
 
 }  // namespace restage

@@ -67,22 +67,46 @@ std::array<double, 2> depths(const std::array<double, 2>& floor, const Soles& so
   return {std::max(0.0, floor[0] - lowest[0]), std::max(0.0, floor[1] - lowest[1])};
 }
 
-double most_lift(const Joints& rest, int side, const Pose& pose) {
-  constexpr double kFolded = 0.45;  // hip to ankle, of the leg
+namespace {
+
+/// A leg from hip to ankle, and the length of its bones.
+struct Leg {
+  Vec3 line;
+  double length;
+};
+
+Leg leg_of(const Joints& rest, int side, const Pose& pose) {
   const Joints joints = forward_kinematics(rest, pose).joints;
   const auto of = [&](int j) { return joints[static_cast<size_t>(j + side)]; };
-  const Vec3 leg = of(7) - of(1);
-  const double least = kFolded * ((of(4) - of(1)).norm() + (of(7) - of(4)).norm());
-  const double beside = std::hypot(leg.x(), leg.z());
-  if (beside >= least) return std::max(0.0, -leg.y());
-  return std::max(0.0, -leg.y() - std::sqrt(least * least - beside * beside));
+  return {of(7) - of(1), (of(4) - of(1)).norm() + (of(7) - of(4)).norm()};
+}
+
+}  // namespace
+
+double most_lift(const Joints& rest, int side, const Pose& pose) {
+  constexpr double kFolded = 0.45;  // hip to ankle, of the leg
+  const Leg leg = leg_of(rest, side, pose);
+  const double least = kFolded * leg.length, beside = std::hypot(leg.line.x(), leg.line.z());
+  if (beside >= least) return std::max(0.0, -leg.line.y());
+  return std::max(0.0, -leg.line.y() - std::sqrt(least * least - beside * beside));
+}
+
+double most_drop(const Joints& rest, int side, const Pose& pose) {
+  constexpr double kStraight = 0.985;  // hip to ankle, of the leg: the knee is bent by 20 degrees
+  const Leg leg = leg_of(rest, side, pose);
+  const double most = kStraight * leg.length, beside = std::hypot(leg.line.x(), leg.line.z());
+  if (beside >= most) return 0;
+  return std::max(0.0, leg.line.y() + std::sqrt(most * most - beside * beside));
 }
 
 void raise_feet(const std::array<double, 2>& by, const Joints& rest, Pose* pose) {
-  for (int side = 0; side < 2; ++side)
-    if (const double lift = std::min(by[static_cast<size_t>(side)], most_lift(rest, side, *pose));
-        lift > 0)
-      move_foot(rest, side, Vec3(0, lift, 0), pose);
+  for (int side = 0; side < 2; ++side) {
+    const double wanted = by[static_cast<size_t>(side)];
+    const double lift = wanted > 0   ? std::min(wanted, most_lift(rest, side, *pose))
+                        : wanted < 0 ? std::max(wanted, -most_drop(rest, side, *pose))
+                                     : 0;
+    if (lift != 0) move_foot(rest, side, Vec3(0, lift, 0), pose);
+  }
 }
 
 }  // namespace restage

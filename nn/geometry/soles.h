@@ -38,8 +38,10 @@ std::array<double, 2> depths(const std::array<double, 2>& floor, const Soles& so
                              const Joints& rest, const Pose& pose);
 /// How far a foot can be raised before its knee is folded, metres.
 double most_lift(const Joints& rest, int side, const Pose& pose);
+/// How far a foot can be lowered before its knee is straight, metres.
+double most_drop(const Joints& rest, int side, const Pose& pose);
 /// Raises the feet, each as far as its knee lets it: hip and knee give way, the foot keeps its
-/// orientation.
+/// orientation. Below zero they are lowered, until the knee is nearly straight.
 void raise_feet(const std::array<double, 2>& by, const Joints& rest, Pose* pose);
 
 }  // namespace restage

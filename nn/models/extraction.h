@@ -11,6 +11,9 @@
 namespace restage {
 
 inline constexpr size_t kLeastDistinctPoints = 64;
+/// Of a person's points in a frame: with fewer, an extractor says that it is surer than it is,
+/// where one side is seen (docs/real_scans.md, "Sparse clouds").
+inline constexpr size_t kEnoughToTrust = 400;
 
 /// Headings over which an extractor's views of a cloud are spread, radians.
 inline constexpr double kAllAround = 6.283185307179586;

@@ -1,5 +1,7 @@
 #include "nn/models/registry.h"
 
+#include <filesystem>
+
 #include "autograd/base/registry.h"
 #include "nn/models/bone_field.h"
 #include "nn/models/closed_form_motion.h"
@@ -89,11 +91,35 @@ Registry<ModelType>& table() {
   return all;
 }
 
+NetworkImporter& importer_of_networks() {
+  static NetworkImporter importer;
+  return importer;
+}
+
 }  // namespace
+
+void set_network_importer(NetworkImporter importer) {
+  importer_of_networks() = std::move(importer);
+}
+
+bool has_network_importer() { return importer_of_networks() != nullptr; }
+
+void import_networks(std::vector<std::string>& files) {
+  for (std::string& file : files) {
+    std::error_code ignored;
+    const auto whole = std::filesystem::absolute(file, ignored);
+    if (!ignored) file = whole.lexically_normal().string();
+    if (has_network_importer()) importer_of_networks()(file);
+  }
+}
 
 const std::deque<ModelType>& models() { return table().all(); }
 
 void register_model(ModelType type) { table().add(std::move(type)); }
+
+void register_own_model(ModelType type) {
+  table().put(std::move(type), [](const ModelType& known) { return !known.module.empty(); });
+}
 
 const ModelType& model_type(const std::string& name) { return table().get(name); }
 

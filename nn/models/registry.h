@@ -3,6 +3,7 @@
 #pragma once
 
 #include <deque>
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -17,7 +18,11 @@ struct ModelType {
   std::string role;    ///< the role that it fills in a system (nn/weights/bundle.h)
   AnyConfig config;    ///< its sizes, at their defaults
   AnyConfig training;  ///< sizes with which a training starts that does not name any
-  std::unique_ptr<Module> (*make)(const AnyConfig& config, const Init& init);
+  std::function<std::unique_ptr<Module>(const AnyConfig& config, const Init& init)> make;
+  // Of a network that is written in Python (docs/design/python_networks.md), else empty.
+  std::string module = {};                ///< the module of Python that defines it
+  std::string code = {};                  ///< a checksum of its source, for identities
+  std::vector<std::string> figures = {};  ///< of its own, after those of its stage
 };
 
 /// The line of a model whose class has a type `Config` with a visit(), and a constructor from one
@@ -36,9 +41,19 @@ ModelType model_of(const char* name, const char* role, const char* help,
 }
 
 const std::deque<ModelType>& models();
+/// Who can import a file of Python that defines networks: a process of Python, no other one.
+using NetworkImporter = std::function<void(const std::string& file)>;
+void set_network_importer(NetworkImporter importer);
+bool has_network_importer();
+/// Imports files that were not imported so far; makes their names absolute. InputError for one that
+/// cannot be imported. Does nothing without an importer.
+void import_networks(std::vector<std::string>& files);
 /// Adds a model of a program that uses this library, before anything else is done; model_of() makes
 /// its line. Error if there is one of that name.
 void register_model(ModelType type);
+/// The same of a network that is written in Python: it takes the place of one of that name that
+/// came from Python, too. Networks that exist stay what they are.
+void register_own_model(ModelType type);
 /// The model of this name, which stays where it is. InputError with the nearest known name if there
 /// is none.
 const ModelType& model_type(const std::string& name);

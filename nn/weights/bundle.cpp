@@ -159,12 +159,26 @@ bool known_model(const std::string& name) {
                      [&](const ModelType& type) { return type.name == name; });
 }
 
+/// A file names the module that defines its network, and nothing is run because a file says so.
+[[noreturn]] void throw_not_imported(const std::string& model, const std::string& module,
+                                     const std::string& where) {
+  const bool file = module.ends_with(".py");
+  throw InputError(where,
+                   "needs the network " + name_in_quotes(model) + ", which the " +
+                       (file ? "file " : "Python module ") + name_in_quotes(module) + " defines",
+                   std::string("import that ") + (file ? "file" : "module") +
+                       " first, or name it: 'python3 -m restage COMMAND ... --python " +
+                       (file ? module : "FILE.py") + "'");
+}
+
 TrainedModel model_of(const std::string& place, const Json& entry, const TensorFile& file,
                       const std::string& where) {
   if (!entry.is_object() || !entry.contains("model") || !entry["model"].is_string())
     throw InputError(where, "does not name its model for " + name_in_quotes(place), kGiveWeights);
   TrainedModel out;
   out.model = entry["model"].get<std::string>();
+  if (!known_model(out.model) && entry.contains("module") && entry["module"].is_string())
+    throw_not_imported(out.model, entry["module"].get<std::string>(), where);
   if (!known_model(out.model) || !may_fill(model_type(out.model).role, role_of(place)))
     throw InputError(where,
                      "names " + name_in_quotes(out.model) + ", which is no model for " + place,
@@ -245,8 +259,10 @@ JointDefinition joint_definition(const Bundle& bundle, const std::string& where)
 
 namespace {
 
-/// A bundle's file, with the sizes of each model as `sizes` gives them.
-TensorFile file_of(const Bundle& bundle, const std::function<ConfigNode(const AnyConfig&)>& sizes) {
+/// A bundle's file, with the sizes of each model as `sizes` gives them. `code`: with the checksum
+/// of a network's source, where it is written in Python.
+TensorFile file_of(const Bundle& bundle, const std::function<ConfigNode(const AnyConfig&)>& sizes,
+                   bool code = false) {
   TensorFile out;
   Json json = {{"format", 1}, {"models", Json::object()}};
   for (const auto& [role, model] : bundle) {
@@ -254,6 +270,10 @@ TensorFile file_of(const Bundle& bundle, const std::function<ConfigNode(const An
     json["models"][place_of(role)] = {{"model", model.model},
                                       {"sizes", sizes_json(sizes(model.config))},
                                       {"settings", model.settings}};
+    const ModelType& type = model_type(model.model);
+    Json& entry = json["models"][place_of(role)];
+    if (!type.module.empty()) entry["module"] = type.module;
+    if (code && !type.code.empty()) entry["code"] = type.code;
   }
   out.metadata[kKey] = json.dump();
   return out;
@@ -269,7 +289,7 @@ std::string identity_bytes(const Bundle& bundle) {
     model.settings.erase(kJointsSetting);
     plain.put(role, std::move(model));
   }
-  return safetensors_bytes(file_of(plain, write_identity<AnyConfig>));
+  return safetensors_bytes(file_of(plain, write_identity<AnyConfig>, true));
 }
 
 void save_bundle(const std::string& path, const Bundle& bundle) {

@@ -47,12 +47,13 @@ def load_clouds(path, sequence=None, scale=1.0, up="y"):
     return _core.load_clouds(path, sequence, scale, up)
 
 
-def load_motion(path, clip="", bones=""):
-    """The motion of a skeleton (BVH, AMC, glTF, VRM, AMASS, our motions) as a Clip.
+def load_motion(path, clip="", bones="", person=""):
+    """The motion of a skeleton (BVH, AMC, glTF, VRM, AMASS, pose estimators, our motions) as a Clip.
 
-    clip: which animation of a glTF file or motion of an HDF5 file; bones: a file that names its bones.
+    clip: which animation of a glTF file or motion of an HDF5 file; bones: a file that names its bones; person: whose
+    motion, of several people's in a pose estimator's file.
     """
-    return Clip(**_core.load_motion(path, clip, bones))
+    return Clip(**_core.load_motion(path, clip, bones, str(person)))
 
 
 def closed_form(source, target_rest, source_rest=None):

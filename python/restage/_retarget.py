@@ -28,7 +28,7 @@ def retarget(source, target, weights=None, out=None, **options):
     """The target performs the source's motion.
 
     source: a file or folder, as the program takes it (clouds, or a skeleton's motion), or a sequence of clouds,
-    each [n, 3] in metres, y up; None, or no points, where a frame is missing, which is filled in. target: a mesh or a
+    each [n, 3] in metres, y up (whatever NumPy takes, and PyTorch's tensors on the CPU); None, or no points, where a frame is missing, which is filled in. target: a mesh or a
     character in T-pose. weights: a file or a run; None: the standard ones. out: a file or folder to write, as the
     program does; then the program's report comes back as a dict, else a Result of arrays. options: the program's, with _ for -: fps=60, source_up="z", scale=0.001,
     samples=8, min_confidence=0.5, foot_lock=False, force=True, seed=1, verbose=True (its log) ...
@@ -84,6 +84,8 @@ def skeleton(points, weights=None, samples=1, seed=0, device="cpu", joints=None,
         found = extractor(cloud, name)[0]
         return _core.convert_joints(found, extractor.joint_definition, joints) if joints else found
 
+    if not isinstance(points, (str, bytes, os.PathLike)):
+        points = _core.array_or_same(points, "points")
     if isinstance(points, (str, bytes, os.PathLike)):
         clouds = _core.load_clouds(points, sequence, 1.0, "y")
         for k, cloud in enumerate(clouds):

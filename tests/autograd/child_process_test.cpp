@@ -123,6 +123,21 @@ TEST(ChildProcess, AHostMayTreatSigchldAsItLikes) {
   }
 }
 
+/// On a busy machine the child waits for the processor most of the time.
+TEST(ChildProcess, WhoWorksSlowlyGoesOn) {
+  const auto slowly = [] {
+    const auto start = std::chrono::steady_clock::now();
+    while (std::chrono::steady_clock::now() - start < std::chrono::milliseconds(2500)) {
+      const auto until = std::chrono::steady_clock::now() + std::chrono::milliseconds(20);
+      while (std::chrono::steady_clock::now() < until) {
+      }
+      std::this_thread::sleep_for(std::chrono::milliseconds(80));
+    }
+    return std::string("done");
+  };
+  EXPECT_EQ(run(slowly, {kLimits.memory, 20, 1}).answer, "done");
+}
+
 TEST(ChildProcess, WhoKillsItIsNotTakenForTheFile) {
   expect_error<WorkError>([] { run([] { return ::raise(SIGKILL), ""; }); },
                           {"x.h5: ", "was killed"});

@@ -1,5 +1,6 @@
 """A headless Chromium whose page a test may look at while it plays. The browser is spoken to through two pipes, as
 --remote-debugging-pipe has it: messages of JSON, each ended by a zero byte."""
+import base64
 import json
 import os
 import select
@@ -35,6 +36,10 @@ class Browser:
         """The page as it is now, in HTML; empty while it loads."""
         expression = "document.documentElement ? document.documentElement.outerHTML : ''"
         return self._ask("Runtime.evaluate", self.session, expression=expression)["result"]["value"]
+
+    def picture(self):
+        """The page as it is seen, PNG."""
+        return base64.b64decode(self._ask("Page.captureScreenshot", self.session, format="png")["data"])
 
     def _page_of(self, address):
         until = time.monotonic() + 60

@@ -244,7 +244,7 @@ class Characters(CliTest):
         self.write("odd.yaml", "title: Odd\njoints:\n" + "".join("  %s: %s\n" % pair for pair in names.items()))
         self.done(*call, "--source-bones", "odd.yaml")
         self.ply("scans/f0.ply", points(120, 0))
-        self.bad_input(["retarget", "--source", "scans", "--source-bones", "odd.yaml", "--target", "hero.glb", "--out", "x.glb"], "leave --source-bones, --body-model and --asf out")
+        self.bad_input(["retarget", "--source", "scans", "--source-bones", "odd.yaml", "--target", "hero.glb", "--out", "x.glb"], "leave --source-bones, --body-model, --layout and --asf out")
 
     def test_rates_and_vrm_animations(self):
         self.bvh("walk.bvh")

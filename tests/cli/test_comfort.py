@@ -101,6 +101,29 @@ class Looks(Comfort):
         self.assertEqual(self.files(), ["tiny.yaml"])
         self.bad_input(["train", "tiny.yaml", "--fast-dev-run", "skeleton.from=none.safetensors"], "none.safetensors")
 
+    def test_find_rate_draws_one_picture_and_writes_nothing_else(self):
+        found = self.json("train", "tiny.yaml", "stages=[skeleton, deformation]", "--find-rate", "rate.svg")
+        self.assertEqual([s["stage"] for s in found["stages"]], ["skeleton", "deformation"])
+        for stage in found["stages"]:
+            self.assertGreater(stage["steps"], 20)
+        self.assertGreater(found["stages"][0]["suggested"], 1e-4)
+        self.assertLess(found["stages"][0]["suggested"], 1)
+        self.assertEqual(self.files(), ["rate.svg", "tiny.yaml"])
+        picture = self.bytes("rate.svg").decode()
+        self.assertTrue(picture.startswith("<svg ") and picture.endswith("</svg>\n"))
+        for words in ("skeleton: loss over learning rate", "deformation: loss", "suggested: "):
+            self.assertIn(words, picture)
+        self.bad_input(["train", "tiny.yaml", "--find-rate", "rate.jpg"], "rate.jpg")
+        self.bad_input(["train", "tiny.yaml", "--find-rate", "rate.svg", "--dry-run"], "--dry-run")
+        self.bad_input(["train", "tiny.yaml", "--find-rate", "nowhere/rate.svg"], "nowhere")
+        self.assertEqual(self.files(), ["rate.svg", "tiny.yaml"])
+
+    def test_groups_are_refused_by_name_before_any_work(self):
+        self.bad_input(["train", "tiny.yaml", "motion.optimiser.groups=[{match: smrm.encc.*, rate: 0.1}]"], "motion.optimiser.groups", "smrm.encc.*", "did you mean 'smrm.enc.*'")
+        self.assertEqual(self.files(), ["tiny.yaml"])
+        run = self.train("stages=[deformation]", "deformation.optimiser.kind=adamw", "deformation.optimiser.groups=[{match: deformation.weights.*, frozen_until: 4, decay: 0.1}]", "loop.keep_best=1")
+        self.assertEqual(len(os.listdir(self.path(run + "/best"))), 1)
+
     def test_one_batch_again_and_again(self):
         arguments = [*SKELETON, "skeleton.optimiser.steps=400", "loop.log_every=1", "loop.validate_every=400"]
         run = self.train(*arguments, "--overfit-batches", 1)

@@ -156,6 +156,14 @@ class Data(CliTest):
         self.bad_input(["data", "build", "--out", "nowhere/x.h5", "--bodies", 1, 0, 0], "nowhere")
         self.bad_input(["data", "import", "nothing", "--out", "x.h5"], "nothing")
 
+    def test_a_list_of_values_that_takes_the_file(self):
+        self.write("clips.h5", b"")
+        for words in (["import", "--without", "ShovelHand", "clips.h5"], ["import", "--betas", "zeros", "clips.h5"],
+                      ["split", "--shares", "8", "1", "1", "clips.h5"], ["split", "--only", "ann", "clips.h5"]):
+            self.bad_input(["data", *words, "--out", "o.h5"], words[1] + " takes several values, and took 'clips.h5' for one of them",
+                           "put 'clips.h5' before " + words[1])
+        self.bad_input(["data", "import", "--without", "A", "B", "--out", "o.h5"], "--source is required")
+
     def test_no_more_frames_are_performed_than_a_motion_has(self):
         self.done("data", "build", "--bodies", 1, 0, 0, "--motions", 1, 0, 0, "--quiet", "--out", "data.h5")
         call = ["data", "perform", "--bodies", "data.h5", "--out", "walk"]

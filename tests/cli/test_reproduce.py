@@ -235,10 +235,11 @@ class OurFolders(CliTest):
             self.bad_input(["reproduce", "somebody2024", "--experiments", "experiments", *words], *contains)
 
     def test_codecheck_names_every_table(self):
-        """The manifest names each page and each table of both papers, and only files that are there."""
+        """The manifest names each page and each table of the papers and of ours, in every form, and only files that are there."""
         with open(os.path.join(ROOT, "docs", "reproduction", "codecheck.yml"), encoding="utf-8") as file:
             named = {n for n in re.findall(r"- file: (\S+)", file.read()) if n.startswith("docs/reproduction/")}
-        there = {os.path.relpath(f, ROOT) for paper in ("rekik2024", "marsot2023") for ending in (".md", "/*.md", "/*.csv")
+        there = {os.path.relpath(f, ROOT) for paper in ("rekik2024", "marsot2023", "chen2023", "ours")
+                 for ending in (".md", "/*.md", "/*.csv", "/*.svg", "/*.tex")
                  for f in glob.glob(os.path.join(ROOT, "docs", "reproduction", paper + ending))}
         self.assertEqual(named, there)
 

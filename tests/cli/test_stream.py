@@ -15,11 +15,13 @@ import subprocess
 import tempfile
 import time
 import unittest
+import urllib.request
 
 import browser
 from support import CliTest, PROGRAM, ROOT
 from test_arrays import npy
 from test_gltf import character
+from test_view import pixels, png
 
 LITE = os.path.join(ROOT, "experiments", "weights", "lite.safetensors")
 # Unity's names of the 22 joints, in our order, and whose child each is.
@@ -157,7 +159,7 @@ class StreamTest(CliTest):
         for clean in (process.stderr.close, process.stdout.close, process.stdin.close, process.wait, process.kill):
             self.addCleanup(clean)
         line = b""
-        while not line.startswith(b"clouds come from"):
+        while not line.startswith(b"frames (clouds or joints) come from"):
             line = process.stderr.readline()
             self.assertTrue(line, "the program has ended")
         return process
@@ -216,6 +218,71 @@ class Streams(StreamTest):
         latency = document["latency_ms"]
         self.assertTrue(0 < latency["p50"] <= latency["p99"] <= latency["max"], latency)
 
+    def test_a_take_is_what_retarget_writes(self):
+        """Clouds without gaps: the file is, byte by byte, that of `retarget --online`."""
+        character(self.path("hero.glb"))
+        for k, points in enumerate(self.clouds):
+            self.ply("scans/f%02d.ply" % k, points)
+        for target, out, more in ((self.target, "take.glb", ["--skeleton", "mixamo"]), (self.target, "take.bvh", []),
+                                  ("hero.glb", "take.vrma", ["--clip-name", "Take"]), ("hero.glb", "hero_take.glb", ["--clip-name", "Take"]),
+                                  ("hero.glb", "bones.gltf", ["--clip-name", "Take", "--animation-only"])):
+            self.done("retarget", "--source", "scans", "--target", target, "--weights", LITE, "--contacts", "on", "--online", "--out", "truth_" + out, *more)
+            process = self.stream("-", "--out", out, *more, target=target)
+            for k, points in enumerate(self.clouds):
+                self.answer(lambda data: (process.stdin.write(data), process.stdin.flush()), points, k / 30)
+                self.assertFalse(os.path.exists(self.path(out)))
+            process.stdin.close()
+            process.stdin = None
+            document, _ = self.ended(process)
+            self.assertEqual((document["out"], document["take_frames"]), (out, 16))
+            self.assertEqual(self.bytes(out), self.bytes("truth_" + out), out)
+
+    def test_a_take_holds_the_last_pose_where_no_new_one_came(self):
+        process = self.stream("-", "--out", "take.bvh")
+
+        def send(k, seconds):
+            return self.answer(lambda data: (process.stdin.write(data), process.stdin.flush()), self.clouds[k], seconds)
+        for k, seconds in enumerate((0, 1 / 30, 5 / 30)):  # of three moments there are no clouds
+            send(k, seconds)
+        begun = time.monotonic()
+        time.sleep(1)
+        send(3, 100)  # the motion begins anew
+        silence = time.monotonic() - begun
+        time.sleep(0.5)
+        begun = time.monotonic()
+        document, _ = self.interrupted(process)  # what is shown to the end is in the file
+        lines = self.bytes("take.bvh").decode().splitlines()
+        rows = lines[lines.index(next(line for line in lines if line.startswith("Frame Time"))) + 1:]
+        self.assertIn("Frames:%11d" % len(rows), lines)
+        self.assertEqual(document["take_frames"], len(rows))
+        # The poses are 0 1 1 1 1 2 2 ... 2 3 3 ... 3.
+        runs = []
+        for row in rows:
+            if not runs or row != runs[-1][0]:
+                runs.append([row, 0])
+            runs[-1][1] += 1
+        counts = [count for _, count in runs]
+        self.assertEqual((len(counts), counts[:2]), (4, [1, 4]))
+        self.assertAlmostEqual(counts[2], 30 * silence, delta=6)
+        self.assertGreaterEqual(counts[3], 14)
+
+    def test_a_take_is_whole_or_not_there(self):
+        process = self.stream("-", "--out", "take.glb")
+        document, err = self.interrupted(process)
+        self.assertEqual((document["out"], document["take_frames"]), (None, 0))
+        self.assertIn("take.glb is not written: no pose was shown", err)
+        self.assertEqual(os.listdir(self.folder), [])
+        process = self.stream("-", "--out", "take.bvh")
+        self.answer(lambda data: (process.stdin.write(data), process.stdin.flush()), self.clouds[0], 0)
+        process.kill()  # no time to write
+        process.wait()
+        self.assertNotIn("take.bvh", os.listdir(self.folder))
+        process = self.stream("-", "--out", "late.glb")
+        self.answer(lambda data: (process.stdin.write(data), process.stdin.flush()), self.clouds[0], 0)
+        process.send_signal(signal.SIGTERM)
+        self.ended(process, 143)
+        self.assertEqual(self.bytes("late.glb")[:4], b"glTF")
+
     def test_while_the_source_is_silent_the_last_pose_goes_on(self):
         process = self.stream("-")
         first = self.answer(lambda data: (process.stdin.write(data), process.stdin.flush()), self.clouds[0], 0)
@@ -258,7 +325,16 @@ class Streams(StreamTest):
         process = self.stream("-")
         out, err = process.communicate(b"ply\nformat ascii 1.0\n" * 9, timeout=30)
         self.assertEqual((process.returncode, out), (2, b""), err)
+        self.assertEqual(err.decode().count("is no valid JSON"), 1, err)
+        self.assertRegex(err.decode(), r"standard input:\d+: is no valid JSON: '(ply|format ascii 1.0)'")
+        process = self.stream("-")
+        out, err = process.communicate(b"\xee" * 400, timeout=30)
+        self.assertEqual((process.returncode, out), (2, b""), err)
         self.assertIn("standard input: holds no frame; send frames as docs/stream.md says", err.decode())
+        process = self.stream("-", "--out", "take.bvh")
+        out, err = process.communicate(b"", timeout=30)
+        self.assertEqual((process.returncode, out), (2, b""), err)
+        self.assertIn("no frame came: take.bvh is not written", err.decode().splitlines()[-1])
 
     def test_clouds_whose_z_points_up(self):
         for given in ([], ["--force"]):
@@ -542,6 +618,87 @@ class Streams(StreamTest):
         self.assertRegex(dom, r'<html[^>]* data-live="[1-9]')
         self.interrupted(process)
 
+    def dressed(self, name):
+        """The character with a picture on its body, whose second half of triangles has other texture coordinates for the same
+        vertices; so what is drawn has more vertices than what moves."""
+        character(self.path(name))
+        data = self.bytes(name)
+        size = struct.unpack("<I", data[12:16])[0]
+        root, binary = json.loads(data[20:20 + size]), data[28 + size:]
+        binary += bytes(-len(binary) % 4)
+
+        def view(content):
+            nonlocal binary
+            root["bufferViews"].append({"buffer": 0, "byteOffset": len(binary), "byteLength": len(content)})
+            binary += content + bytes(-len(content) % 4)
+            return len(root["bufferViews"]) - 1
+        primitive = root["meshes"][0]["primitives"][0]
+        count = root["accessors"][primitive["attributes"]["POSITION"]]["count"]
+        corners = root["accessors"][primitive["indices"]]
+        half = corners["count"] // 6 * 3
+        second = {**corners, "count": corners["count"] - half,
+                  "byteOffset": corners.get("byteOffset", 0) + half * {5121: 1, 5123: 2, 5125: 4}[corners["componentType"]]}
+        corners["count"] = half
+        root["accessors"].append(second)
+        other = {**primitive, "indices": len(root["accessors"]) - 1, "attributes": dict(primitive["attributes"]), "material": 0}
+        for one, u in ((primitive, 0.25), (other, 0.75)):
+            root["accessors"].append({"bufferView": view(struct.pack("<2f", u, 0.5) * count), "componentType": 5126, "count": count, "type": "VEC2"})
+            one["attributes"]["TEXCOORD_0"] = len(root["accessors"]) - 1
+            one["material"] = 0
+        root["meshes"][0]["primitives"] = [primitive, other]
+        picture = png(32, 32, lambda x, y: (255, 0, 0, 255) if x < 16 else (0, 255, 0, 255))
+        root.update(images=[{"bufferView": view(picture), "mimeType": "image/png"}], textures=[{"source": 0}],
+                    materials=[{"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}, "extensions": {"KHR_materials_unlit": {}}}],
+                    buffers=[{"byteLength": len(binary)}])
+        text = json.dumps(root).encode()
+        text += b" " * (-len(text) % 4)
+        self.write(name, struct.pack("<4sIIII", b"glTF", 2, 28 + len(text) + len(binary), len(text), 0x4E4F534A) + text +
+                   struct.pack("<II", len(binary), 0x004E4942) + binary)
+        return count
+
+    def meta_of(self, page):
+        with urllib.request.urlopen("http://127.0.0.1:%d/" % page) as answer:
+            return json.loads(re.search(r'<script id="meta"[^>]*>(.*?)</script>', answer.read().decode()).group(1))
+
+    def test_the_ground_of_the_page_is_that_of_the_motion(self):
+        """Wherever the target's file has it."""
+        with open(self.target, "rb") as f:
+            head, _, body = f.read().partition(b"end_header\n")
+        count = int(head.split(b"element vertex ")[1].split()[0])
+        lifted = b"".join(struct.pack("<3f", x, y + 5, z) for x, y, z in struct.iter_unpack("<3f", body[:12 * count]))
+        self.write("lifted.ply", head + b"end_header\n" + lifted + body[12 * count:])
+        page = free_port()
+        process = self.stream("-", "--ws", str(page), target="lifted.ply")
+        clip = self.meta_of(page)["clips"][0]
+        self.assertEqual(clip["floor"], 0)
+        self.assertAlmostEqual(clip["low"][1], 0, delta=0.1)
+        bundle = self.answer(lambda data: (process.stdin.write(data), process.stdin.flush()), self.clouds[0], 0)
+        self.assertLess(max(y for _, y, _ in joints_of(bundle)), 2.5)
+        self.interrupted(process)
+
+    @unittest.skipUnless(browser.PROGRAM, "no Chromium found (set CHROMIUM)")
+    def test_the_page_shows_the_characters_own_picture(self):
+        count = self.dressed("hero.glb")
+        port, page = free_port(), free_port()
+        process = self.stream("tcp://127.0.0.1:%d" % port, "--ws", str(page), target="hero.glb")
+        shown = browser.Browser(self, "http://127.0.0.1:%d/" % page)
+        send, k, drawn, until = self.sender(port).sendall, 0, False, time.monotonic() + 60
+        while not drawn and time.monotonic() < until:
+            for _ in range(15):
+                send(frame(k / 30, self.clouds[k % 16]))
+                time.sleep(1 / 30)
+                k += 1
+            drawn = re.search(r"s, frame ([1-9]\d*)</output>", shown.page())
+        self.assertTrue(drawn)
+        meta = self.meta_of(page)
+        self.assertEqual((meta["sent"], meta["clips"][0]["counts"], len(meta["clips"][0]["materials"])), (count, [2 * count], 1))
+        self.write("seen.png", shown.picture())
+        rows = pixels(self.bytes("seen.png"))
+        flat = [p for row in rows for p in row]
+        for colour in (0, 1):
+            self.assertGreater(sum(p[colour] > 200 and max(p[j] for j in range(3) if j != colour) < 60 for p in flat), 300, "red, green")
+        self.interrupted(process)
+
     def test_ends_after_so_many_seconds(self):
         start = time.monotonic()
         document = json.loads(self.done("stream", "--target", self.target, "--source", "tcp://127.0.0.1:%d" % free_port(), "--vmc",
@@ -575,6 +732,16 @@ class Streams(StreamTest):
         self.bad_input(call(samples="0"), "--samples")
         self.bad_input(call(**{"source-up": "w"}), "--source-up")
         self.bad_input(call(**{"min-confidence": "0.5"}), "do not say how sure")  # of these weights
+        character(self.path("hero.glb"))
+        for out, words in (("take.h5", "is no animation"), ("takes/", "is no animation"), ("take.fbx", "Blender writes"), ("take.mp4", "no kind"),
+                           ("no/take.glb", "a folder that is not there"), ("in/take.glb", "the folder from which clouds are read"),
+                           ("take.vrm", "own file, which has no rig"), ("take.gltf", "own file, which has no rig")):
+            self.bad_input(call(out=out), out, words)
+        self.bad_input(call(target="hero.glb", out="hero.glb"), "hero.glb")
+        self.bad_input(call(target="hero.glb", out="take.vrm"), "take.vrm", "would be no VRM character")
+        self.bad_input(call(target="hero.glb", out="take.glb", skeleton="mixamo"), "hero.glb", "leave --skeleton out")
+        self.bad_input(call(skeleton="mixamo"), "--skeleton is for the file of --out")
+        self.bad_input(call(out="take.bvh") + ["--animation-only"], "take.bvh", "--animation-only")
         self.ply("dot.ply", [(0, 0, 0)] * 3)
         self.bad_input(call(target="dot.ply"), "dot.ply")
         with socket.socket() as busy:

@@ -482,7 +482,7 @@ class Runs(Sweep):
         # Sweeper and trial both see the request, while a step is on.
         sweeper = self.sweeper("skeleton.optimiser.steps=1000000", "skeleton.optimiser.batch=6000", "store=d-store")
         logs = self.path("d-store/.skeleton-*.partial/log.txt")
-        self.wait_for(lambda: any("1000000 steps" in open(f).read() for f in glob.glob(logs)))  # from here on steps are made
+        self.wait_for(lambda: any(b"1000000 steps" in self.bytes(f) for f in glob.glob(logs)))  # from here on steps are made
         self.done("sweep", "stop", "d")
         self.assertEqual(sweeper.wait(120), 1, sweeper.stderr.read())
         self.assertEqual(self.json("sweep", "status", "d")["counts"]["stopped"], 1, "it ended by itself")
@@ -513,6 +513,22 @@ class Runs(Sweep):
             self.assertEqual(sweeper.wait(60), code)
             self.assertEqual(self.running(), [])
             self.assertEqual(self.json("sweep", "status", "d")["counts"]["stopped"], 1)
+
+    def test_a_killed_sweeper_ends_its_trials(self):
+        sweeper = self.sweeper("skeleton.optimiser.steps=1000000", "store=d-store")
+        status = self.json("sweep", "status", "d")["trials"][0]
+        logs = self.path("d-store/.skeleton-*.partial/log.txt")
+        self.wait_for(lambda: any(b"1000000 steps" in self.bytes(f) for f in glob.glob(logs)))
+        sweeper.kill()
+        sweeper.wait()
+        self.wait_for(lambda: not self.running())
+        self.wait_for(lambda: not os.path.exists("/proc/" + status["holder"].split()[1]))
+        self.assertEqual(self.result(status["id"])["state"], "stopped")
+        kept = [n for f, _, names in os.walk(self.path("d-store")) for n in names if n.startswith("skeleton-0")]
+        self.assertTrue(kept, "with a checkpoint")
+        # One that was told of a caller that is gone does not begin.
+        gone = self.restage("trial", "d", status["id"], "--ends-with", 2 ** 22 - 1)
+        self.assertEqual(gone.code, 143)
 
     def test_a_caller_that_ignores_its_children(self):
         """A program inherits from its caller that the ends of its children are ignored."""

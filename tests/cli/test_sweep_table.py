@@ -66,6 +66,16 @@ class Tables(CliTest):
         self.assertIsNone(table["rows"][0]["metrics"]["naked"]["mpjpe"]["deviation"])
         self.bad_input(["sweep", "table", "s", "--out", "nowhere/t.csv"], "nowhere/t.csv")
 
+    def test_two_trials_give_an_interval_with_a_warning(self):
+        told = [n for n in self.json("sweep", "table", "s")["notices"] if "n = 2" in n]
+        self.assertEqual(told, [])
+        self.write("s/plan.json", json.dumps({"trials": [t for t in self.trials if (t["seed"], t["overrides"]["motion.weights.smoothness"]) != (3, 0)]}))
+        result = self.restage("sweep", "table", "s", "--out", "t.md")
+        said = [line for line in result.err.splitlines() if "n = 2" in line]
+        self.assertEqual(len(said), 1, result.err)
+        self.assertIn("two trials stand behind 'motion.weights.smoothness=0'", said[0])
+        self.assertEqual(self.bytes("t.md").decode().count("n = 2"), 1)
+
     def test_bad_input(self):
         self.bad_input(["sweep", "table", "nowhere"], "nowhere", "trials")
         self.bad_input(["sweep", "table", "s", "--out", "t.pdf"], "t.pdf", ".svg")

@@ -106,6 +106,60 @@ class Runs(Train):
         self.write(run + "/config.yaml", config)
         self.done("train", "resume=" + run, "--quiet")
 
+    def test_a_run_of_an_older_program_goes_on(self):
+        run = self.train("tiny.yaml", "stages=[motion]", "motion.optimiser.steps=4")
+        config, said = self.bytes(run + "/config.yaml").decode(), json.loads(self.bytes(run + "/provenance.json"))
+        # As if the program that began it had not known these keys.
+        older = dict(said, configuration={k: v for k, v in said["configuration"].items()
+                                          if k not in ("loop.logs.0", "loop.ema", "motion.optimiser.lion.beta1")})
+        old = config.replace("  logs:\n    - jsonl\n", "").replace("  ema: 0\n", "")
+        self.assertLess(len(old), len(config))
+        self.write(run + "/config.yaml", old)
+        self.write(run + "/provenance.json", json.dumps(older))
+        self.done("train", "resume=" + run, "--quiet")
+        self.write(run + "/config.yaml", config)
+        self.done("train", "resume=" + run, "--quiet")
+        self.write(run + "/config.yaml", config.replace("  ema: 0\n", "  ema: 0.9\n"))
+        self.bad_input(["train", "resume=" + run], "'loop.ema' of config.yaml is new and not its default")
+        self.write(run + "/config.yaml", config)
+        self.write(run + "/provenance.json", json.dumps(dict(older, configuration={})))
+        self.bad_input(["train", "resume=" + run], "is new and not its default")
+
+    def test_a_run_goes_on_with_its_data_elsewhere_and_more_steps(self):
+        self.done("data", "build", "--bodies", 2, 2, 1, "--motions", 4, 2, 1, "--quiet", "--out", "old.h5")
+        words = ["tiny.yaml", "stages=[skeleton]", "skeleton.optimiser.schedule.kind=constant"]
+        run = self.train(*words, "data.source=old.h5", "skeleton.optimiser.steps=20")
+        whole = self.train(*words, "data.source=old.h5", "skeleton.optimiser.steps=30")
+        os.rename(self.path("old.h5"), self.path("new.h5"))
+        self.bad_input(["train", "resume=" + run], "old.h5", "data.source=PATH")
+        self.done("data", "build", "--bodies", 2, 2, 1, "--motions", 4, 2, 1, "--seed", 4, "--quiet", "--out", "other.h5")
+        self.bad_input(["train", "resume=" + run, "data.source=other.h5"], "have changed")
+        for word in ("seed=3", "skeleton.optimiser.batch=3", "skeleton.optimiser.steps=10", "motion.optimiser.steps=99"):
+            self.bad_input(["train", "resume=" + run, "data.source=new.h5", word], word.split("=")[0])
+        self.done("train", "resume=" + run, "data.source=new.h5", "skeleton.optimiser.steps=30", "loop.log_every=7", "--quiet")
+        self.assertEqual(self.weights_of(run), self.weights_of(whole), "the same as 30 steps in one go")
+        self.assertEqual(json.loads(self.bytes(run + "/provenance.json"))["resumed"][0]["command_line"][3], "data.source=new.h5")
+        self.done("train", "resume=" + run, "--quiet")  # the folder says it now
+
+    def test_variables_of_the_environment(self):
+        text = self.bytes("tiny.yaml").decode()
+        self.write("env.yaml", text.replace("seed:", "run_root: ${oc.env:RESTAGE_TEST_ROOT,here}/deep\nseed:", 1) if "seed:" in text
+                   else text + "run_root: ${oc.env:RESTAGE_TEST_ROOT,here}/deep\n")
+        keys = self.json("train", "env.yaml", "--print-config")["keys"]
+        self.assertEqual(keys["run_root"], "here/deep")
+        self.assertEqual(self.json("train", "tiny.yaml", "run_root=~/x", "--print-config")["keys"]["run_root"], os.path.expanduser("~/x"))
+        self.bad_input(["train", "tiny.yaml", "run_root=${oc.env:NO_SUCH_NAME}"], "NO_SUCH_NAME")
+        self.write("chosen.yaml", "include: ${oc.env:RESTAGE_TEST_BASE,tiny}.yaml\nseed: 5\n")
+        self.assertEqual(self.json("train", "chosen.yaml", "--print-config")["keys"]["seed"], 5)
+        os.environ["RESTAGE_TEST_BASE"] = "missing"
+        self.addCleanup(os.environ.pop, "RESTAGE_TEST_BASE")
+        self.bad_input(["train", "chosen.yaml"], "chosen.yaml:1", "the included file 'missing.yaml' does not exist")
+        os.environ["RESTAGE_TEST_BASE"] = "${OTHER}/x"
+        self.bad_input(["train", "chosen.yaml"], "chosen.yaml:1", "the variable 'RESTAGE_TEST_BASE' holds '${OTHER}/x'", "without ${")
+        self.bad_input(["train", "tiny.yaml", "run_root=${oc.env:NO_SUCH_NAME,${HOME}}"], "'NO_SUCH_NAME'", "without ${")
+        self.write("refers.yaml", "include: tiny.yaml\nname: ${name}_x\n")
+        self.bad_input(["train", "refers.yaml"], "refers.yaml:2", "refers to 'name'")
+
     def test_what_must_be_known_of_the_weights_is_kept(self):
         run = self.train("tiny.yaml", "motion.windows.remove_heading=true", "motion.windows.translation=relative")
         self.done("weights", "export", "--source", run, "--model", "smrm", "--out", "alone.safetensors")
@@ -212,7 +266,7 @@ class Resume(Train):
         self.assertEqual(sorted(os.listdir(self.path("runs"))), sorted(os.path.basename(r) for r in (whole, run)))
 
     def test_signals_write_a_checkpoint(self):
-        for number, code in ((signal.SIGTERM, 143), (signal.SIGINT, 130)):
+        for number, code in ((signal.SIGTERM, 143), (signal.SIGINT, 130), (signal.SIGUSR1, 138), (signal.SIGHUP, 129)):
             process, run = self.begin("tiny.yaml", *LONG)
             while "1/1000000" not in process.stderr.readline():
                 pass
@@ -298,7 +352,7 @@ class Resume(Train):
         self.bad_input(["train", "resume=nowhere"], "nowhere", "run directory")
         self.bad_input(["train", "resume=runs"], "runs", "run directory")
         self.bad_input(["train", "resume="])
-        self.bad_input(["train", "resume=" + run, "seed=4"], "'seed=4'")
+        self.bad_input(["train", "resume=" + run, "seed=4"], "'seed'")
         self.bad_input(["train", "tiny.yaml", "resume=" + run])
         self.write(run + "/config.yaml", CONFIG + "speling: 1\n")
         self.bad_input(["train", "resume=" + run], "config.yaml:", "'speling'")

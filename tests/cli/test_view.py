@@ -220,6 +220,63 @@ class View(CliTest):
         self.assertIn("data:image/png;base64,", page)
         self.assertNotIn("http://", page.replace("http://www.w3.org", ""))
 
+    def halves(self, *arguments):
+        """Of two takes: the rows of the left and of the right half, without the labels."""
+        self.done("view", "--compare", *arguments, "--size", "160x128", "--side", "front", "--out", "two.png")
+        rows = pixels(self.bytes("two.png"))
+        self.assertEqual((len(rows), len(rows[0])), (128, 160))
+        return [row[:80] for row in rows[:100]], [row[80:] for row in rows[:100]], rows[100:]
+
+    def test_two_takes_side_by_side(self):
+        self.changed("blue.glb", lambda r: r["materials"][0].update(pbrMetallicRoughness={"baseColorFactor": [0, 0, 1, 1]}))
+        left, right, labels = self.halves("box.glb", "blue.glb", "--frame", 0)
+        red, green, blue = self.colours(left)
+        self.assertTrue(red > 500 and green > 500 and blue == 0, (red, green, blue))
+        self.assertEqual(self.colours(right)[:2], [0, 0])
+        self.assertAlmostEqual(self.colours(right)[2], red + green, delta=100, msg="as large")  # but for where red meets green
+        for side in (0, 80):  # a name below each
+            self.assertGreater(sum(sum(p) < 400 for row in labels for p in row[side:side + 80]), 20)
+        tall = Glb()
+        for node in tall.root["nodes"][1:2]:
+            node["scale"] = [2, 2, 2]
+        self.write("tall.glb", tall.glb())
+        left, right, _ = self.halves("box.glb", "tall.glb", "--frame", 0)
+        self.assertAlmostEqual(sum(self.colours(right)) / sum(self.colours(left)), 4, delta=0.4)
+
+    def test_the_shorter_take_holds_its_last_frame(self):
+        short = Glb()
+        for accessor in short.root["accessors"]:
+            accessor["count"] = 11 if accessor["count"] == FRAMES else accessor["count"]
+        self.write("short.glb", short.glb())
+        clips = ["--clip", "bend", "--source-clip", "bend"]
+        at = {f: self.halves("short.glb", "box.glb", *clips, "--frame", f) for f in (0, 10, 30)}
+        self.assertNotEqual(at[0][0], at[10][0])
+        self.assertEqual(at[10][0], at[30][0])
+        self.assertNotEqual(at[10][1], at[30][1])
+        self.assertEqual(at[10][0], self.halves("short.glb", "box.glb", *clips, "--time", 1)[0])
+        for out, frames in (("two.webp", 31), ("two.gif", 16), ("two.html", 31), ("sheet.png", 31)):
+            result = self.restage("view", "--compare", "short.glb", "box.glb", *clips, "--json", "--out", out, *(["--columns", 3] if out == "sheet.png" else []))
+            self.assertEqual(result.code, 0, result.err)
+            warned = [line for line in result.err.splitlines() if line.startswith("warning")]
+            self.assertEqual(len(warned), 1, result.err)
+            self.assertRegex(warned[0], "short.glb: bend ends after .* box.glb: bend after .* holds its last frame")
+            self.assertEqual(json.loads(result.out)["frames"], frames)
+        self.assertEqual(sum(webp_frames(self.bytes("two.webp"))), round(31000 / 30))
+        page = self.bytes("two.html").decode()
+        self.assertEqual(page.count('class="panel below"'), 2)
+        meta = json.loads(page.split('<script id="meta" type="application/json">')[1].split("</script>")[0])
+        self.assertEqual([len(clip["counts"]) for clip in meta["clips"]], [31, 31])
+        self.assertEqual([clip["label"] for clip in meta["clips"]], ["short.glb: bend", "box.glb: bend"])
+        self.assertTrue(all(clip["materials"] for clip in meta["clips"]))
+        two = ["view", "--compare", "short.glb", "box.glb", "--out", "x.png"]
+        self.bad_input(two + ["--frame", 31], "short.glb", "no frame 31", "0 to 30")
+        self.bad_input(two + ["--time", 9], "short.glb", "nothing at 9 seconds")
+        self.bad_input(two + ["--source-clip", "walk"], "short.glb", "holds no clip")
+        self.bad_input(two + ["--source-sequence", 1], "--source-sequence")
+        self.bad_input(two + ["--source-fps", 30], "--source-fps")
+        self.bad_input(["view", "--compare", "gone.glb", "box.glb", "--out", "x.png"], "gone.glb")
+        self.bad_input(["view", "--compare", "short.glb", "box.glb", "--out", "short.glb"], "short.glb")
+
     def test_other_files(self):
         person = self.person()
         self.ply("person.ply", person)
@@ -227,6 +284,12 @@ class View(CliTest):
         self.assertEqual(self.json("view", "walk/source.h5", "--size", "40x60", "--out", "a.webp")["frames"], 12)
         self.h5("result.h5", joints=((4, 22, 3), 0.0), vertices=((4, 60, 3), [x for f in range(4) for p in points(60, f) for x in p]))
         self.assertEqual(self.json("view", "result.h5", "--size", "40x60", "--every", 2, "--out", "a.gif")["frames"], 2)
+        # A mesh of another kind wears its picture, as long as it is neither turned nor scaled.
+        self.write("red.png", png(4, 4, lambda x, y: (255, 0, 0, 255)))
+        self.write("red.mtl", "newmtl red\nmap_Kd red.png\n")
+        self.write("red.obj", "mtllib red.mtl\nusemtl red\nv -1 0 0\nv 1 0 0\nv 1 2 0\nv -1 2 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nf 1/1 2/2 3/3 4/4\n")
+        self.assertGreater(self.colours(self.picture("--side", "front", file="red.obj"))[0], 500)
+        self.assertEqual(self.colours(self.picture("--side", "front", "--up", "y", file="red.obj"))[0], 0)
         self.write("tri.obj", "v 0 0 0\nv 0 170 0\nv 50 0 0\nf 1 2 3\n")
         result = self.restage("view", "tri.obj", "--out", "a.png")
         self.assertIn("drawn as large as a person", result.err)

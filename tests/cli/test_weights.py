@@ -53,6 +53,13 @@ class Weights(CliTest):
             found = self.json("skeleton", "--weights", shipped, "--source", "a.ply")["frames"]
             self.assertEqual(len(found[0]["joints"]), 22, name)
 
+    def test_show_takes_names_and_says_which_file(self):
+        for name in ("lite", "standard"):
+            shown = self.json("weights", "show", name)
+            self.assertEqual(os.path.basename(shown["file"]), name + ".safetensors")
+            self.assertTrue(shown["tensors"])
+        self.bad_input(["weights", "show", "nonsense"], "nonsense", "no weights of this name")
+
     def test_out_and_in_again(self):
         self.write("o.safetensors", tensors(OFFSETS))
         self.done("weights", "import", "--source", "o.safetensors", "--model", "deformation/offsets", "--out", "w.safetensors")

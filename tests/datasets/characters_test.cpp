@@ -139,6 +139,22 @@ TEST_F(Characters, ATrunkBesideItsLegsIsMovedByWhatCarriesBoth) {
   expect_played(in, performed(in, dir / "out.glb"));
 }
 
+/// A bone file may name the root on the ground: it carries legs and spine.
+TEST_F(Characters, APelvisOnTheGroundTurnsTheBodyAboutTheHips) {
+  testing::KnownCharacter known = known_;
+  known.body.joints[0] = Vec3(0, 0, 0);
+  const RigStyle style = testing::plain_style();
+  const std::string in = write("in.glb", CharacterMaker(known, style).parts);
+  const std::string bones = dir.write("names.yaml", testing::bones_yaml(style));
+  const TargetMesh target = read_target(in, bones);
+  ASSERT_TRUE(target.own);
+  const Joints& rest = target.own->rest();
+  const Vec3 hips = 0.5 * (rest[kLeftHip] + rest[kRightHip]);
+  EXPECT_GT(rest[kPelvis].y(), hips.y());
+  EXPECT_LT((rest[kPelvis] - hips).norm(), 0.2 * leg_length(rest));
+  expect_played(in, performed(in, dir / "out.glb", {}, bones), bones);
+}
+
 TEST_F(Characters, APelvisThatIsNamedBesideTheLegsIsMovedByWhatCarriesBoth) {
   // Body carries the thighs and Hips, and is named for nothing.
   RigStyle style = testing::plain_style();

@@ -363,7 +363,7 @@ TEST(Precision, FarPointsAreRefusedOrReadRelativeToThem) {
   std::ofstream(path) << "v 5000000.125 0 1\nv 5000000.25 1.5 1\nv 5000001 0 0.5\n";
   EXPECT_THROW(read_mesh(path), InputError);
   Vec3 origin;
-  size_t left_out = 0;
+  LeftOut left_out;
   const Mesh mesh = read_mesh(path, left_out, origin);
   EXPECT_EQ(mesh.vertices[1].x() + origin.x(), 5000000.25);
   EXPECT_EQ(mesh.vertices[1].y() + origin.y(), 1.5);

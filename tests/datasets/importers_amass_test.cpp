@@ -145,21 +145,22 @@ TEST_F(ImportersAmass, WhatIsWrongIsSaid) {
     ImportReport report;
     return error_of([&] { import_amass(Npz(dir / "c.npz"), models, {}, report); });
   };
-  const WrongArray wrong[] = {{"mocap_framerate", "", "with fps"},
-                              {"mocap_framerate", npy<double>({}, {0}), "no frame rate"},
-                              {"mocap_framerate", npy_text("fast"), "no frame rate"},
-                              {"poses", doubles({121, 69}, 0), "[121, 69]"},
-                              {"poses", doubles({121, 52, 4}, 0), "quaternions"},
-                              {"poses", doubles({121, 52, 3, 3}, 0), "no rotation"},
-                              {"poses", doubles({156}, 0), "[156]"},
-                              {"poses", doubles({0, 156}, 0), "0 frames"},
-                              {"poses", doubles({121, 156}, NAN), "finite"},
-                              {"trans", doubles({120, 3}, 0), "[121, 3]"},
-                              {"trans", doubles({3, 121}, 0), "[121, 3]"},
-                              {"trans", doubles({363}, 0), "[121, 3]"},
-                              {"trans", doubles({121, 3}, INFINITY), "finite"},
-                              {"betas", doubles({2, 4}, 0), "one person"},
-                              {"betas", doubles({4}, NAN), "NaN"}};
+  const WrongArray wrong[] = {
+      {"mocap_framerate", "", "with fps"},
+      {"mocap_framerate", npy<double>({}, {0}), "no frame rate"},
+      {"mocap_framerate", npy_text("fast"), "no frame rate"},
+      {"poses", doubles({121, 69}, 0), "[121, 69]"},
+      {"poses", doubles({121, 52, 4}, 0), "a quaternion that is no rotation"},
+      {"poses", doubles({121, 52, 3, 3}, 0), "no rotation"},
+      {"poses", doubles({156}, 0), "[156]"},
+      {"poses", doubles({0, 156}, 0), "0 frames"},
+      {"poses", doubles({121, 156}, NAN), "finite"},
+      {"trans", doubles({120, 3}, 0), "[121, 3]"},
+      {"trans", doubles({3, 121}, 0), "[121, 3]"},
+      {"trans", doubles({363}, 0), "[121, 3]"},
+      {"trans", doubles({121, 3}, INFINITY), "finite"},
+      {"betas", doubles({2, 4}, 0), "one person"},
+      {"betas", doubles({4}, NAN), "NaN"}};
   for (const auto& [name, bytes, says] : wrong)
     EXPECT_HAS(refused(with(TinyClip().arrays(), name, bytes)), says) << name;
   // Found by the fuzzer: text of the file in a message that is one short line.
@@ -439,8 +440,8 @@ TEST_F(ImportersAmass, RotationMatricesOfAllJointsAndMissingParts) {
     EXPECT_EQ(import_amass(file, models, {}, report).frames(), 31u);
   }
   for (const auto& [shape, says] : std::vector<std::pair<std::vector<int64_t>, const char*>>{
-           {{31, 144}, "turn its 6D rotations"},
-           {{31, 96}, "turn its quaternions"},
+           {{31, 144}, "6 numbers that are no rotation"},
+           {{31, 96}, "a quaternion that is no rotation"},
            {{31, 3, 17}, "rotations are axis-angle numbers"}}) {
     int64_t size = 1;
     for (const int64_t n : shape) size *= n;

@@ -51,7 +51,7 @@ Read read(const std::string& glb) {
 
 TEST_F(MeshDocumentTest, ObjKeepsCornersMaterialsAndPictures) {
   const std::string path = dir.write("in/square.obj", kSquare);
-  dir.write("in/my look.mtl", kLook);
+  dir.write("in/my look.mtl", "\xef\xbb\xbf" + kLook);  // with a mark, as Windows writes it
   dir.write("in/tex/skin 1.png", kPng);
   const auto made = mesh_document(path, 4);
   ASSERT_TRUE(made);

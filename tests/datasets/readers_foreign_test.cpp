@@ -52,6 +52,18 @@ TEST_F(ReadersForeign, KnownByTheirNamesAndByTheirFirstBytes) {
   }
 }
 
+TEST_F(ReadersForeign, RecordingsOfLaboratoriesAreKnownByTheirNames) {
+  const std::string xml = "<?xml version=\"1.0\"?>\n<mvnx version=\"4\">" + std::string(600, ' ');
+  const std::string table =
+      "Coordinates\nversion=1\nnRows=2\nendheader\ntime\tknee_angle_r\n0\t1\n";
+  expect_told(dir.write("walk.mvnx", xml), dir / "o.h5", "is a recording of Xsens MVN",
+              "export BVH");
+  for (const char* name : {"walk.mot", "walk.sto"})
+    expect_told(dir.write(name, table), dir / "o.h5", "holds angles of an OpenSim model", "TRC");
+  expect_told(dir.write("walk.c3d", "\2P" + std::string(600, ' ')), dir / "o.h5", "holds markers",
+              "solve a skeleton");
+}
+
 TEST_F(ReadersForeign, FbxIsReadOnlyByItsOwnName) {
   for (const char* start : {"Kaydara FBX Binary  \x1a", "; FBX 7.3.0 project file\n"}) {
     for (const char* ending : {".bvh", ".glb", ".ply", ".obj", ".vrm", ".pcd", ".amc"})

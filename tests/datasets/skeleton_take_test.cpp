@@ -58,6 +58,25 @@ TEST_F(SkeletonTakeTest, TheSameSkeletonDoesTheSame) {
   }
 }
 
+/// Programs write a still clip first, of the pose in which a rig was made.
+TEST_F(SkeletonTakeTest, OfSeveralClipsTheFirstThatMovesIsTaken) {
+  testing::KnownCharacter known = known_;
+  known.pose = [still = known_.pose(0)](double) { return still; };
+  CharacterMaker maker(known, testing::plain_style());
+  known.pose = known_.pose;
+  maker.add_motion("moves");
+  maker.add_motion("moves too");
+  maker.parts.root["animations"][0]["name"] = "Take 001";
+  const std::string path = dir.write("in.glb", maker.parts.glb());
+  const SkeletonTake take = read_take(path, {});
+  EXPECT_EQ(take.name, "moves");
+  EXPECT_GT((take.frames.back().joints[kLeftWrist] - take.frames[0].joints[kLeftWrist]).norm(),
+            0.05);
+  TakeOptions other;
+  other.clip = "moves too";
+  EXPECT_EQ(read_take(path, other).name, "moves too");
+}
+
 TEST_F(SkeletonTakeTest, AnotherSizeGoesAnotherWay) {
   const SkeletonTake p = read_take(write(testing::plain_style()), {});
   const Joints rest = standing(1.5);

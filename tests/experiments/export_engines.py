@@ -89,10 +89,10 @@ class RealTrials(NeedsPrograms):
                     found[os.path.relpath(f.name, os.path.join(self.folder, "store-" + engine))] = f.read()
         return found
 
-    def check(self, engine, run):
+    def check(self, engine, run, *more):
         self.restage("sweep", "plan", "sweep.yaml", "--out", engine, "store=store-" + engine)
         script = os.path.join(self.folder, engine + ".script")
-        self.restage("sweep", "export", engine, "--engine", engine, "--out", script)
+        self.said = json.loads(self.restage("sweep", "export", engine, "--engine", engine, "--out", script, "--json", *more))
         self.assertEqual(run(script), 0)
         counts = json.loads(self.restage("sweep", "status", engine, "--json"))["counts"]
         self.assertEqual((counts["done"], counts["pending"] + counts["failed"] + counts["running"] + counts["stopped"]), (4, 0))
@@ -110,15 +110,36 @@ class RealTrials(NeedsPrograms):
     def test_snakemake(self):
         self.need("snakemake")
         self.check("snakemake", lambda script: subprocess.run(
-            ["snakemake", "--cores", "2", "-s", script, "-d", self.folder], capture_output=True, timeout=300).returncode)
+            ["snakemake", "--cores", "2", "-s", script, "-d", self.folder], capture_output=True, timeout=300).returncode, "--measure")
+        with open(os.path.join(self.folder, "snakemake.script")) as f:
+            self.assertIn('"mem_mb": %d' % self.said["megabytes"], f.read())
 
     def test_slurm(self):
         self.need("munged", "slurmctld", "slurmd", "sbatch")
         if os.geteuid() != 0:
             self.skipTest("a Slurm of one's own needs root")
         with Slurm(self) as slurm:
-            self.check("slurm", lambda script: subprocess.run(
-                ["sbatch", "--wait", "--output=/dev/null", script], env=slurm.environment, capture_output=True, timeout=300).returncode)
+            def run(script):
+                """What Slurm understood of the script, then the jobs."""
+                held = subprocess.run(["sbatch", "--hold", "--parsable", "--output=/dev/null", script], env=slurm.environment,
+                                      capture_output=True, text=True, timeout=60)
+                self.assertEqual(held.returncode, 0, held.stderr)
+                job = held.stdout.strip()
+                shown = subprocess.run(["scontrol", "show", "job", job], env=slurm.environment, capture_output=True, text=True).stdout
+                subprocess.run(["scancel", job], env=slurm.environment)
+                minutes = self.said["minutes"]
+                for words in ("ArrayTaskId=0-3", "Requeue=1", "CPUs/Task=%d" % self.said["threads"], "MinMemoryNode=",
+                              "TimeLimit=%02d:%02d:00" % (minutes // 60, minutes % 60)):
+                    self.assertIn(words, shown)
+                return subprocess.run(["sbatch", "--wait", "--output=/dev/null", script], env=slurm.environment,
+                                      capture_output=True, timeout=300).returncode
+            self.check("slurm", run, "--measure")
+            with open(os.path.join(self.folder, "slurm.script")) as f:
+                script = f.read()
+            self.assertIn("#SBATCH --mem=%dM\n" % self.said["megabytes"], script)
+            self.assertIn("#SBATCH --cpus-per-task=%d\n" % min(4, os.cpu_count()), script)
+            self.assertTrue(10 <= self.said["minutes"] < 30, self.said)
+            self.assertTrue(64 <= self.said["megabytes"] < 8000, self.said)
 
 
 class Engines(NeedsPrograms):
@@ -253,6 +274,33 @@ class Engines(NeedsPrograms):
         self.assertEqual(job.wait(30), 143)
         self.assertTrue(os.path.exists(self.path("checkpoint")))
 
+    def test_a_slurm_job_whose_time_is_up_queues_itself_again(self):
+        """Slurm sends USR1 two minutes before: the trial writes a checkpoint, and goes on in the next job."""
+        with open(self.program, "w") as f:
+            f.write('#!/bin/bash\ntrap \'exit 143\' TERM\necho > "$2/started"; while true; do sleep 0.1; done\n')
+        tools = os.path.join(os.path.dirname(self.program), "bin")
+        os.mkdir(tools)
+        with open(os.path.join(tools, "scontrol"), "w") as f:
+            f.write('#!/bin/bash\necho "$*" >> "%s"\n' % os.path.join(tools, "said"))
+        os.chmod(os.path.join(tools, "scontrol"), 0o755)
+        script = self.export("slurm", "--mem", "3000", "--time", "95")
+        with open(script) as f:
+            text = f.read()
+        self.assertIn("#SBATCH --mem=3000M\n#SBATCH --time=1:35:00\n", text)
+        self.assertIn("#SBATCH --signal=B:USR1@120\n", text)
+        for number, said in ((signal.SIGTERM, False), (signal.SIGUSR1, True)):
+            job = subprocess.Popen(["bash", script], start_new_session=True,
+                                   env=dict(os.environ, SLURM_ARRAY_TASK_ID="4", SLURM_JOB_ID="77", PATH=tools + ":" + os.environ["PATH"]))
+            end = time.monotonic() + 30
+            while not os.path.exists(self.path("started")) and time.monotonic() < end:
+                time.sleep(0.05)
+            job.send_signal(number)
+            self.assertEqual(job.wait(30), 143)
+            self.assertEqual(os.path.exists(os.path.join(tools, "said")), said)
+            os.remove(self.path("started"))
+        with open(os.path.join(tools, "said")) as f:
+            self.assertEqual(f.read(), "requeue 77\n")
+
     def test_more_trials_than_an_array_may_have_tasks(self):
         trials = [{"id": f"{i:012x}", "case": "", "seed": i, "overrides": {}, "artifacts": {}} for i in range(2500)]
         with open(self.path("plan.json"), "w") as f:
@@ -316,9 +364,11 @@ class Slurm:
                  "AccountingStorageType": "accounting_storage/none", "MpiDefault": "none", "SwitchType": "switch/none",
                  "ReturnToService": 2, "SchedulerType": "sched/builtin", "SelectType": "select/cons_tres", "SelectTypeParameters": "CR_CPU",
                  "SlurmdParameters": "config_overrides"}
+        with open("/proc/meminfo") as f:
+            memory = int(f.readline().split()[1]) // 1024
         with open(self.path("slurm.conf"), "w") as f:
             f.writelines(f"{key}={value}\n" for key, value in lines.items())
-            f.write(f"NodeName={host} NodeAddr=127.0.0.1 CPUs={os.cpu_count()} State=UNKNOWN\n")
+            f.write(f"NodeName={host} NodeAddr=127.0.0.1 CPUs={os.cpu_count()} RealMemory={memory} State=UNKNOWN\n")
             f.write(f"PartitionName=all Nodes={host} Default=YES MaxTime=INFINITE State=UP\n")
         # slurmd wants a cgroup plugin although nothing uses one; this one looks for no cgroups before it must.
         with open(self.path("cgroup.conf"), "w") as f:

@@ -255,9 +255,10 @@ TEST_F(TableTest, ReferencesOfAllTrialsAreRowsOfTheirOwn) {
   EXPECT_EQ(json["references"].size(), 2u);
   // It is told that an average of what rows were measured beside is one, and what it was beside
   // each.
-  ASSERT_EQ(table.notices.size(), 2u);
+  ASSERT_EQ(table.notices.size(), 3u);
   EXPECT_HAS(table.notices[0], "averages: 'closed form on naked'; --against");
-  EXPECT_HAS(table.notices[1], "fewer than five trials stand behind");
+  EXPECT_HAS(table.notices[1], "two trials stand behind '6D', 'quaternion': with n = 2");
+  EXPECT_HAS(table.notices[2], "fewer than five trials stand behind");
   const auto by_case = reference_by_case(results, "naked", "closed form");
   EXPECT_NEAR(by_case.at("quaternion").at("mpjpe"), 0.075, 1e-12);
   EXPECT_NEAR(by_case.at("6D").at("mpjpe"), 0.175, 1e-12);

@@ -39,7 +39,7 @@ void finite(const Points& points) {
 
 void doctor_surface(const std::string& bytes) {
   Vec3 origin;
-  size_t left_out = 0;
+  LeftOut left_out;
   const Mesh mesh = read_mesh(file_of(bytes, "x.obj"), left_out, origin);
   ExamineOptions options;
   const int way = way_of(bytes, 3);

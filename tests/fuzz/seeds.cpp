@@ -3,6 +3,8 @@
 #include <functional>
 #include <map>
 
+#include "autograd/base/format.h"
+#include "autograd/base/words.h"
 #include "datasets/builtin/bodies.h"
 #include "datasets/importers/rigs/profiles.h"
 #include "datasets/sampling/surface.h"
@@ -12,6 +14,7 @@
 #include "nn/weights/bundle.h"
 #include "tests/datasets/gltf_maker.h"
 #include "tests/datasets/importers_bvh_text.h"
+#include "tests/datasets/pickle_support.h"
 #include "tests/datasets/smpl_support.h"
 #include "tests/fuzz/old_layout.h"
 #include "tests/fuzz/targets.h"
@@ -52,7 +55,21 @@ Seeds ply_seeds() {
   large += 'f' + big(uint16_t{4});
   for (uint32_t i = 0; i < 4; ++i) large += big(i);
   large += big(7);
-  return {{"cloud", "ply\nformat ascii 1.0\n" + header + "end_header\n" + corners},
+  std::string packed = "ply\nformat binary_little_endian 1.0\nelement chunk 1\n";
+  for (const char* name : {"min_x", "min_y", "min_z", "max_x", "max_y", "max_z"})
+    packed += cat("property float ", name, "\n");
+  packed +=
+      "element vertex 3\nproperty uint packed_position\nproperty uint packed_color\nend_header\n";
+  for (int i = 0; i < 6; ++i) packed += test::raw(static_cast<float>(i));
+  for (uint32_t i = 0; i < 6; ++i) packed += test::raw(0x9E3779B9u * (i + 1));
+  const std::string strips = "ply\nformat ascii 1.0\n" + vertices +
+                             "float z\nproperty float opacity\nproperty float scale_0\nelement "
+                             "tristrips 1\nproperty list int int vertex_indices\nend_header\n";
+  std::string splats;
+  for (int i = 0; i < 4; ++i) splats += cat(i, " 0 1 ", 2 * i - 4, " 1\n");
+  return {{"packed", packed},
+          {"strips", strips + splats + "6 0 1 2 3 -1 2\n"},
+          {"cloud", "ply\nformat ascii 1.0\n" + header + "end_header\n" + corners},
           {"mesh", "ply\nformat ascii 1.0\nobj_info y\n" + header + faces + "end_header\n" +
                        corners + "3 0 1 2\n4 0 1 2 3\n"},
           {"little", little},
@@ -92,11 +109,47 @@ Seeds pcd_seeds() {
                          test::raw(uint32_t{40}) + packed}};
 }
 
+Seeds joints_seeds() {
+  const Joints rest = builtin_rest_joints();
+  std::string rows = "frame,joint,x,y,z\n", names, places, columns, numbers;
+  std::vector<float> flat;
+  for (size_t j = 0; j < kJoints; ++j) {
+    const Vec3& x = rest[j];
+    rows += cat("0,", j, format(",%.3f,%.3f,%.3f\n", x.x(), x.y(), x.z()));
+    names += cat(j > 0 ? ", \"" : "\"", kJointNames[j], "\"");
+    places += cat(j > 0 ? ", " : "", format("[%.3f, %.3f, %.3f]", x.x(), x.y(), x.z()));
+    columns += cat("\t", kJointNames[j], "\t\t");
+    numbers += format("\t%.3f\t%.3f\t%.3f", x.x(), x.y(), x.z());
+    for (int axis = 0; axis < 3; ++axis) flat.push_back(static_cast<float>(x[axis]));
+  }
+  return {{"rows", rows, Cut::any},
+          {"json",
+           cat("{\"joint_names\": [", names,
+               "], \"frames\": [{\"bodies\": [{\"joint_positions\": [", places, "]}]}]}"),
+           Cut::any},
+          {"trc",
+           cat("PathFileType\t4\t(X/Y/Z)\ta.trc\nDataRate\n30\nFrame#\tTime", columns,
+               "\n\tX1\n1\t0", numbers, "\n"),
+           Cut::any},
+          {"array", test::npy<float>({1, kJoints, 3}, flat), Cut::any}};
+}
+
 Seeds table_seeds() {
+  std::string recording = "time_us,x,y,z\n";
+  for (int i = 0; i < 128; ++i) recording += cat(46 * (i / 8), ",", i, ".5,1,2\n");
   return {{"rows", "# x y z\n1 2 3\n-1.#IND nan 6\n", Cut::any},
           {"count", "2\n1 2 3 9\n4 5 6 9\n", Cut::any},
           {"named", "n,z,\"X [m]\",y\n1,2,3,4\n2,,5,6\n", Cut::any},
+          {"colmap", "# ID, X, Y, Z, TRACK[]\n1 0.5 1.5 2.5 3 4\n9 0.2 1.2 2.2\n", Cut::any},
+          {"times", recording, Cut::any},
           {"commas", "x;y;z\n0,5;1;2\n", Cut::any}};
+}
+
+/// Points of a LiDAR.
+Seeds raw_seeds() {
+  std::string out;
+  for (int i = 0; i < 4 * 20; ++i) out += test::raw(0.5f + static_cast<float>(i % 7));
+  return {{"kitti", out, Cut::any}};
 }
 
 // ---- characters --------------------------------------------------------------------------------
@@ -217,7 +270,12 @@ Seeds npz_seeds() {
   modern.name = "points.npy";
   modern.bytes = cloud;
   modern.deflate = modern.zip64 = modern.descriptor = true;
+  const std::string counts = test::npy<int64_t>({2}, {3, 4});
+  const std::string windows = test::npy<float>({1, 2, 4, 3}, numbers(24));
+  const std::string mask = test::npy<int64_t>({2, 4}, {1, 1, 0, 0, 1, 1, 1, 0});
   return {{"packed", test::npz({{"points", cloud}, {"fps", rate}})},
+          {"filled", test::npz({{"points", cloud}, {"lengths", counts}})},
+          {"windows", test::npz({{"points", windows}, {"mask", mask}})},
           {"stored", test::npz({{"vertices", cloud}, {"text", test::npy_text("a")}}, false)},
           {"zip64", test::zip_of({modern}, "comment")}};
 }
@@ -230,6 +288,31 @@ Seeds amass_seeds() {
   modern.type = true;
   return {{"clip", framed(clip.arrays()), Cut::never_cut},
           {"modern", framed(modern.arrays()), Cut::never_cut}};
+}
+
+Seeds pickle_seeds() {
+  namespace p = test::pickle;
+  const std::vector<double> turns(2 * 66, 0.1), path(2 * 3, 0.5), camera(2 * 4, 1);
+  const std::string wham = p::map({{p::text("pose_world"), p::joblib_array({2, 66}, turns)},
+                                   {p::text("trans_world"), p::array({2, 3}, path)},
+                                   {p::text("betas"), p::array({4}, {1, 2, 0, 1})}});
+  const std::string frame = p::map(
+      {{p::text("tid"), p::list({p::number(1)})},
+       {p::text("smpl"),
+        p::list(
+            {p::map({{p::text("poses"), p::array({66}, {turns.begin(), turns.begin() + 66})}})})},
+       {p::text("camera"), p::list({p::array({3}, {0, 1, 2})})}});
+  const std::string tensors =
+      p::map({{p::text("body_pose"), p::tensor("0", 132, 3, {2, 63}, {66, 1})},
+              {p::text("global_orient"), p::tensor("0", 132, 0, {2, 3}, {66, 1})},
+              {p::text("transl"), p::tensor("1", 6, 0, {2, 3}, {3, 1})}});
+  return {
+      {"people", p::file(p::map({{p::number(3), wham}, {p::number(7), wham}}))},
+      {"frames", p::file(p::map({{p::text("a/1.jpg"), frame}, {p::text("a/2.jpg"), frame}}))},
+      {"objects", p::npy_objects({}, {p::map({{p::text("pose"), p::array({2, 66}, turns)},
+                                              {p::text("orig_cam"), p::array({2, 4}, camera)}})})},
+      {"old", "(dp0\nVposes\np1\n(lp2\nF0.5\naI3\naL7L\nasV\\u00e9\nNsS'x\\x00'\nI01\ns."},
+      {"torch", p::torch_file(p::map({{p::text("smpl_params_global"), tensors}}), {turns, path})}};
 }
 
 Seeds smpl_seeds() {
@@ -384,6 +467,8 @@ std::vector<Seed> seeds(std::string_view target) {
       {"obj", obj_seeds},
       {"pcd", pcd_seeds},
       {"table", table_seeds},
+      {"joints", joints_seeds},
+      {"raw", raw_seeds},
       {"gltf", gltf_seeds},
       {"character", character_seeds},
       {"bvh", bvh_seeds},
@@ -402,6 +487,7 @@ std::vector<Seed> seeds(std::string_view target) {
       {"npy", npy_seeds},
       {"npz", npz_seeds},
       {"amass", amass_seeds},
+      {"pickle", pickle_seeds},
       {"smpl", smpl_seeds},
       {"safetensors", safetensors_seeds},
       {"config", config_seeds},

@@ -9,12 +9,16 @@
 
 #include "autograd/base/atomic_file.h"
 #include "autograd/base/error.h"
+#include "datasets/importers/joints/solve.h"
 #include "datasets/importers/motions/amass.h"
 #include "datasets/importers/motions/amc.h"
 #include "datasets/importers/motions/bvh.h"
+#include "datasets/importers/motions/estimated.h"
 #include "datasets/importers/rigs/gltf_character.h"
+#include "datasets/readers/arrays/nested_file.h"
 #include "datasets/readers/clouds/mesh_io.h"
 #include "datasets/readers/clouds/mesh_parsers.h"
+#include "datasets/readers/clouds/table_frames.h"
 #include "datasets/readers/frames/array_frames.h"
 #include "datasets/readers/frames/frame_folder.h"
 #include "datasets/readers/frames/hdf5_frames.h"
@@ -73,7 +77,10 @@ void play(const std::string& path) {
 
 // ---- meshes and characters ---------------------------------------------------------------------
 
-void read_ply(const std::string& bytes) { parse_mesh(bytes, "x.ply"); }
+void read_ply(const std::string& bytes) {
+  size_t faint = 0;
+  parse_mesh(bytes, "x.ply", Vec3::Zero(), NonFinite::refuse, &faint);
+}
 void read_obj(const std::string& bytes) { parse_mesh(bytes, "x.obj"); }
 void read_pcd(const std::string& bytes) {
   parse_mesh(bytes, "x.pcd", Vec3::Zero(), NonFinite::mark);
@@ -91,11 +98,37 @@ void read_names_of_frames(const std::string& bytes) {
     throw std::logic_error("frames are lost");
 }
 
+void read_raw(const std::string& bytes) {
+  raw_columns(bytes, bytes.size());
+  parse_mesh(bytes, "x.bin", Vec3::Zero(), NonFinite::mark);
+}
+
 /// A table of points; and its lines as names of files.
 void read_table(const std::string& bytes) {
   starts_as_table(bytes);
+  names_frames(bytes);
   do_all({[&] { parse_mesh(bytes, "x.csv", Vec3::Zero(), NonFinite::mark); },
+          [&] {
+            const auto frames = parse_table_frames(bytes, "x.csv");
+            if (frames && frames->offset.back() != std::ssize(frames->points))
+              throw std::logic_error("points are lost");
+          },
           [&] { read_names_of_frames(bytes); }});
+}
+
+/// Joints, in the form that the bytes begin as; a short recording is solved, too.
+void read_joints(const std::string& bytes) {
+  const bool json = bytes.starts_with("{") || bytes.starts_with("[");
+  const char* name = json                                ? "x.json"
+                     : bytes.starts_with("PathFileType") ? "x.trc"
+                     : bytes.starts_with("\x93NUMPY")    ? "x.npy"
+                                                         : "x.csv";
+  const std::string path = file_of(bytes, name);
+  const auto joints = find_joint_recording(path, {});
+  if (!joints || joints->frames.size() > 20) return;
+  ImportReport report;
+  report.file = path;
+  solve_joints(*joints, {}, report);
 }
 
 void read_scene(const std::string& bytes) {
@@ -200,6 +233,22 @@ void read_motion(const std::string& bytes) {
   import_amass(Npz(file_of(test::npz(arrays_of(bytes), false), "x.npz")), models, {}, report);
 }
 
+/// A pickle in whatever wrapping, and the motions in it.
+void read_pickles(const std::string& bytes) {
+  constexpr uint64_t kMemory = uint64_t{16} << 20;
+  static BodyModels models(file_of(test::TinySmpl().file(), "model.npz"));
+  const ValueTree tree = read_nested_file(file_of(bytes, "x.pkl"), kMemory);
+  tree.summary();
+  std::vector<std::function<void()>> actions;
+  const std::vector<EstimatedMotion> motions = estimated_motions(tree, kMemory);
+  for (const EstimatedMotion& one : motions)
+    actions.emplace_back([&one] {
+      ImportReport report;
+      import_amass(*one.arrays, models, {}, report, nullptr, one.hints);
+    });
+  do_all(actions);
+}
+
 void read_body_model(const std::string& bytes) {
   const Npz file(file_of(test::npz(arrays_of(bytes), false), "x.npz"));
   SmplModel model(file);
@@ -297,6 +346,7 @@ const std::vector<Target>& targets() {
       {"obj", "obj", kShort, 65, 500, read_obj},
       {"pcd", "cloud", kShort, 65, 500, read_pcd},
       {"table", "cloud", kShort, 65, 500, read_table},
+      {"raw", "cloud", kShort, 65, 100, read_raw},
       {"gltf", "gltf", kLong, 65, 3000, read_scene},
       {"character", "gltf", kLong, 65, 3000, read_rigged},
       {"bvh", "bvh", kLong, 65, 900, read_bvh_text},
@@ -306,6 +356,8 @@ const std::vector<Target>& targets() {
       {"npy", "npy", kShort, 65, 500, read_npy_file},
       {"npz", "npy", kShort, 192, 800, read_npz_file},
       {"amass", "npy", kLong, 65, 600, read_motion},
+      {"pickle", "pickle", kShort, 65, 2000, read_pickles},
+      {"joints", "npy", kShort, 96, 300, read_joints},
       {"smpl", "npy", kModel, 66, 300, read_body_model},
       {"safetensors", "safetensors", kLong, 65, 3000, read_weights},
       {"config", "yaml", kShort, 65, 3000, read_training},

@@ -208,5 +208,43 @@ TEST(Contacts, AFigureWithoutASurfaceIsTaken) {
   for (const Mat3& r : out.local) EXPECT_TRUE(r.allFinite());
 }
 
+/// Short upper arms: their wrists cannot come nearer to the shoulder than the bones differ.
+TEST(Contacts, AnArmOfUnequalBonesIsNotFoldedThrough) {
+  Body target = person();
+  for (const int side : {0, 1}) {
+    const Vec3 shoulder = target.joints[static_cast<size_t>(kLeftShoulder + side)],
+               wrist = target.joints[static_cast<size_t>(kLeftWrist + side)];
+    target.joints[static_cast<size_t>(kLeftElbow + side)] = shoulder + 0.3 * (wrist - shoulder);
+  }
+  for (const double bent : {110.0, 130.0, 150.0}) {
+    const Pose pose = performed(person(), target, with_left_arm(person(), 60, bent));
+    const Joints x = forward_kinematics(target.joints, pose).joints;
+    const double upper = (x[kLeftElbow] - x[kLeftShoulder]).norm(),
+                 lower = (x[kLeftWrist] - x[kLeftElbow]).norm();
+    EXPECT_GT((x[kLeftWrist] - x[kLeftShoulder]).norm(), lower - upper + 0.05 * (upper + lower))
+        << bent;
+  }
+}
+
+TEST(Contacts, ElbowsFollowTheirOwnMoves) {
+  const Joints& rest = person().joints;
+  const Pose copied = with_left_arm(person(), 60, 80);
+  const std::array<Vec3, 2> by = {Vec3(-0.15, 0.2, -0.1), Vec3::Zero()};
+  Pose plain = copied, smooth = copied, held = copied;
+  move_hands(rest, by, &plain);
+  const std::array<Vec3, 2> elbows = elbows_moved(rest, by, copied);
+  move_hands(rest, by, elbows, &smooth);
+  move_hands(rest, by, {0.1 * elbows[0], Vec3::Zero()}, &held);
+  const Joints before = forward_kinematics(rest, copied).joints,
+               own = forward_kinematics(rest, plain).joints,
+               same = forward_kinematics(rest, smooth).joints,
+               near = forward_kinematics(rest, held).joints;
+  EXPECT_LT((elbows[0] - own[kLeftElbow] + before[kLeftElbow]).norm(), 1e-12);
+  EXPECT_LT((same[kLeftElbow] - own[kLeftElbow]).norm(), 1e-9);
+  EXPECT_LT((near[kLeftElbow] - before[kLeftElbow]).norm(), 0.95 * elbows[0].norm());
+  EXPECT_LT((near[kLeftWrist] - own[kLeftWrist]).norm(), 1e-9) << "the hand stays";
+  EXPECT_LT((near[kRightElbow] - before[kRightElbow]).norm(), 1e-12);
+}
+
 }  // namespace
 }  // namespace restage

@@ -94,6 +94,36 @@ TEST(Footing, NoFootGoesBelowTheFloor) {
   EXPECT_LT((after.joints[15] - before.joints[15]).norm(), 1e-9);
 }
 
+TEST(Footing, AFootThatFloatsIsLetDownWhileTheSourcesIsNearTheFloor) {
+  const Body body = toy_body();
+  const Soles soles = soles_of(body);
+  Joints a = body.joints;
+  const auto shown = [&](Footing& footing) {
+    Pose pose = at_rest(body.joints);
+    pose.local[2] = Eigen::AngleAxisd(-0.45, Vec3::UnitX()).toRotationMatrix();
+    pose.local[5] = Eigen::AngleAxisd(0.9, Vec3::UnitX()).toRotationMatrix();
+    const PosedSkeleton before = forward_kinematics(body.joints, pose);
+    footing.settle_feet(body.joints, a, 1, &pose);
+    const PosedSkeleton after = forward_kinematics(body.joints, pose);
+    EXPECT_LT((after.global[8] - before.global[8]).norm(), 1e-9) << "the ankle's turn stays";
+    return std::pair(soles.lowest(before), soles.lowest(after));
+  };
+  Footing footing(soles);
+  double height = 1;
+  for (int f = 0; f < 12; ++f) {
+    const auto [before, after] = shown(footing);
+    EXPECT_GT(before[1], 0.05);
+    EXPECT_LE(after[1], height + 1e-9) << f;
+    EXPECT_NEAR(after[0], before[0], 0.001) << "the other foot is on the floor";
+    height = after[1];
+  }
+  EXPECT_LT(height, 0.025);
+  for (const int j : {8, 11}) a[static_cast<size_t>(j)].y() += 0.3;  // a kick
+  Footing kicks(soles);
+  const auto [before, after] = shown(kicks);
+  EXPECT_NEAR(after[1], before[1], 1e-9);
+}
+
 TEST(Footing, AHeldFootIsHeldOnTheFloor) {
   const Body body = toy_body();
   const Soles soles = soles_of(body);
@@ -107,7 +137,7 @@ TEST(Footing, AHeldFootIsHeldOnTheFloor) {
     pose.root.x() += 0.002 * f;
     const auto above = footing(body.joints, a, 1, {0.9, 0.9}, &pose);
     lock(body.joints, {0.9, 0.9}, &pose, above);
-    footing.keep_above(body.joints, a, 1, &pose);
+    footing.settle_feet(body.joints, a, 1, &pose);
     if (f < 20) continue;
     for (const double height : soles.lowest(forward_kinematics(body.joints, pose)))
       EXPECT_NEAR(height, 0, 0.015) << f;

@@ -18,6 +18,7 @@
 #include "infer/live/server.h"
 #include "infer/live/timeline.h"
 #include "infer/live/vmc.h"
+#include "tests/infer/live_support.h"
 #include "tests/support/tiny_body.h"
 
 namespace restage::live {
@@ -31,28 +32,6 @@ std::string frame_bytes(double seconds, const Points& points) {
   std::memcpy(out.data(), &count, 4);
   std::memcpy(out.data() + 4, &seconds, 8);
   for (const Point& p : points) out.append(reinterpret_cast<const char*>(p.data()), 12);
-  return out;
-}
-
-/// What a parser makes of bytes that come in pieces of `piece`.
-struct Parsed {
-  std::vector<LiveCloud> clouds;
-  std::vector<std::string> refused;
-  std::string garbage;
-  bool in_frame = false;
-};
-
-Parsed parsed(const std::string& bytes, size_t piece) {
-  Parsed out;
-  FrameParser parser;
-  for (size_t at = 0; at < bytes.size() && out.garbage.empty(); at += piece) {
-    const size_t count = std::min(piece, bytes.size() - at);
-    out.garbage = parser.take(
-        {reinterpret_cast<const unsigned char*>(bytes.data()) + at, count}, Clock::now(),
-        [&](LiveCloud& cloud) { out.clouds.push_back(cloud); },
-        [&](const std::string& why) { out.refused.push_back(why); });
-  }
-  out.in_frame = parser.in_frame();
   return out;
 }
 

@@ -316,6 +316,57 @@ TEST(Webp, DecodesToWhatWentIn) {
   WebPAnimDecoderDelete(decoder);
 }
 
+/// A soft shadow that moves by less than a pixel a picture.
+Image soft_shadow(int frame) {
+  Image image(160, 96, {0, 0, 0});
+  for (int y = 0; y < image.height; ++y)
+    for (int x = 0; x < image.width; ++x) {
+      const double u = (x - 60 - 0.7 * frame) / 40, v = (y - 48) / 22.0;
+      const auto grey = static_cast<uint8_t>(std::lround(235 - 60 * std::exp(-u * u - v * v)));
+      fill_rectangle(image, x, y, 1, 1, {grey, grey, grey});
+    }
+  return image;
+}
+
+/// The largest error of the mean grey of a block of 8 x 8 pixels.
+double worst_block(const Image& a, const uint8_t* rgba) {
+  double worst = 0;
+  for (int top = 0; top < a.height; top += 8)
+    for (int left = 0; left < a.width; left += 8) {
+      double sum = 0;
+      for (int y = top; y < top + 8; ++y)
+        for (int x = left; x < left + 8; ++x) {
+          const auto k = static_cast<size_t>(y * a.width + x);
+          sum += a.rgb[3 * k + 1] - rgba[4 * k + 1];
+        }
+      worst = std::max(worst, std::abs(sum / 64));
+    }
+  return worst;
+}
+
+TEST(Webp, SoftShadowsThatMoveHaveNoBlocks) {
+  const auto writer = webp_writer(25);
+  for (int f = 0; f < 20; ++f) writer->push(soft_shadow(f));
+  const std::string bytes = writer->finish();
+  const WebPData data{reinterpret_cast<const uint8_t*>(bytes.data()), bytes.size()};
+  WebPAnimDecoder* decoder = WebPAnimDecoderNew(&data, nullptr);
+  ASSERT_NE(decoder, nullptr);
+  for (int f = 0; WebPAnimDecoderHasMoreFrames(decoder); ++f) {
+    uint8_t* pixels = nullptr;
+    int end = 0;
+    ASSERT_TRUE(WebPAnimDecoderGetNext(decoder, &pixels, &end));
+    EXPECT_LT(worst_block(soft_shadow(f), pixels), 2) << f;
+  }
+  WebPAnimDecoderDelete(decoder);
+}
+
+TEST(Webp, APictureThatStaysIsStoredOnce) {
+  const auto once = webp_writer(25), often = webp_writer(25);
+  once->push(soft_shadow(0));
+  for (int f = 0; f < 50; ++f) often->push(soft_shadow(0));
+  EXPECT_LT(often->finish().size(), once->finish().size() + 20);
+}
+
 struct GifInput {
   std::string bytes;
   size_t at = 0;

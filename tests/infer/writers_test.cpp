@@ -6,6 +6,7 @@
 #include <cstring>
 #include <numbers>
 
+#include "autograd/base/error.h"
 #include "datasets/frame_writer.h"
 #include "datasets/readers/skeletons/bvh.h"
 #include "infer/writers/bvh.h"
@@ -189,6 +190,47 @@ TEST_F(GlbWriterTest, BadInputLeavesNothing) {
   pose.root.x() = INFINITY;
   EXPECT_THROW(writer.push(pose), WorkError);
   EXPECT_TRUE(fs::is_empty(dir.path()));
+}
+
+TEST_F(GlbWriterTest, MorphTargetsAreBytesWithWeightsOverTime) {
+  const Body body = toy_body();
+  GlbWriter writer(dir / "morphs.glb", body.rest, body.joints, body.weights);
+  for (int f = 0; f < 3; ++f) writer.push(toy_pose(body, f / 20.0));
+  const size_t vertices = body.rest.vertices.size();
+  GlbMorphs morphs;
+  for (const int size : {1, 2}) {
+    morphs.deltas.emplace_back();
+    for (size_t i = 0; i < 3 * vertices; ++i)
+      morphs.deltas.back().push_back(static_cast<int8_t>(static_cast<int>(i) * size % 255 - 127));
+  }
+  morphs.weights = {0.1f, 0.2f, 0.3f, -0.4f, 0.5f, 0};
+  morphs.distance = {0.001, -1, 0.002};
+  GlbMorphs short_ones = morphs;
+  short_ones.weights.pop_back();
+  EXPECT_THROW(writer.set_morphs(short_ones), ShapeError);
+  short_ones = morphs;
+  short_ones.deltas[0].pop_back();
+  EXPECT_THROW(writer.set_morphs(short_ones), ShapeError);
+  writer.set_morphs(morphs);
+  writer.commit();
+  const auto model = load("morphs.glb");
+  EXPECT_EQ(model.extensionsRequired, std::vector<std::string>{"KHR_mesh_quantization"});
+  const auto& targets = model.meshes.at(0).primitives.at(0).targets;
+  ASSERT_EQ(targets.size(), 2u);
+  for (size_t k = 0; k < 2; ++k) {
+    const auto& a = model.accessors.at(targets[k].at("POSITION"));
+    EXPECT_TRUE(a.normalized);
+    ASSERT_EQ(a.count, vertices);
+    const auto& view = model.bufferViews.at(a.bufferView);
+    const auto* bytes = model.buffers.at(0).data.data() + view.byteOffset;
+    for (size_t i = 0; i < 3 * vertices; ++i)
+      ASSERT_EQ(static_cast<int8_t>(bytes[view.byteStride * (i / 3) + i % 3]), morphs.deltas[k][i]);
+  }
+  const auto& animation = model.animations.at(0);
+  const auto& last = animation.channels.back();
+  EXPECT_EQ(last.target_path, "weights");
+  EXPECT_EQ(model.nodes.at(last.target_node).mesh, 0);
+  EXPECT_EQ(values<float>(model, animation.samplers.at(last.sampler).output), morphs.weights);
 }
 
 TEST(GlbInfluences, RowsOfAnySharpness) {

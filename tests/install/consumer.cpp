@@ -24,7 +24,7 @@ int main() {
       samples,
       {"two numbers", {gradcheck::random({2}, 1)}, [](gradcheck::Args x) { return square(x[0]); }});
   if (!report.ok() || report.compared == 0) return 1;
-  if (!mine::checks_an_op() || !mine::trains_and_answers()) return 1;
+  if (!mine::checks_an_op() || !mine::finds_joints() || !mine::trains_and_answers()) return 1;
   try {
     inspect("no such file.h5");
   } catch (const InputError&) {

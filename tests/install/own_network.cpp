@@ -18,6 +18,7 @@
 #include "nn/config/rules.h"
 #include "nn/layers/linear.h"
 #include "nn/models/registry.h"
+#include "nn/models/skeleton.h"
 #include "nn/models/transfer.h"
 #include "train/stages/supervised_stage.h"
 #include "train/training/training.h"
@@ -56,6 +57,41 @@ struct Shift : TransferModel {
   }
   const char* kind() const override { return "Shift"; }
   Linear in, out;
+};
+
+struct PooledConfig {
+  int64_t width = 32, points = 128;
+};
+
+template <class V>
+void visit(V& v, PooledConfig& c) {
+  v("width", c.width, "units of the hidden layers", between(1, 1024));
+  v("points", c.points, "points per cloud", between(1, 4096));
+}
+
+/// An extractor: each point by itself, the largest over all points, the joints.
+struct Pooled : SkeletonModel {
+  using Config = PooledConfig;
+  Pooled(const PooledConfig& c, const Init& init)
+      : each(3, c.width, init.sub("each")),
+        joints(c.width, 3 * kJoints, init.sub("joints")),
+        points_(c.points) {}
+  SkeletonOutput forward(Context& ctx, const SkeletonInput& in) override {
+    const Var whole = max(each(ctx, in.cloud, Activation::relu), 1);
+    SkeletonOutput out;
+    out.joints = reshape(joints(ctx, whole), {in.cloud.size(0), kJoints, 3});
+    return out;
+  }
+  int64_t points() const override { return points_; }
+  void visit(Fields& f) override {
+    f("each", each);
+    f("joints", joints);
+  }
+  const char* kind() const override { return "Pooled"; }
+  Linear each, joints;
+
+ private:
+  int64_t points_;
 };
 
 /// A kernel of one's own, number by number: x^2 / (1 + x^2), the loss of Geman and McClure, in
@@ -172,6 +208,27 @@ bool checks_an_op() {
   const gradcheck::Report report = gradcheck::check(gradcheck::all_samples().back());
   std::printf("%s", report.text().c_str());
   return report.ok() && report.compared > 0;
+}
+
+bool finds_joints() {
+  register_model(model_of<Pooled>("mine/pooled", "skeleton", "the largest over all points"));
+  TrainConfig config;
+  read_config(parse_yaml("name: joints\n"
+                         "stages: [skeleton]\n"
+                         "data: {bodies: {train: 2, validation: 1, test: 1},"
+                         " motions: {train: 2, validation: 1, test: 1}}\n"
+                         "skeleton: {model: mine/pooled, validation_clouds: 4,"
+                         " optimiser: {steps: 60, batch: 8, schedule: {rate: 0.01}}}\n",
+                         "joints.yaml"),
+              config);
+  const TrainingData data(config.data);
+  RunDir run = RunDir::create("runs", config.name, resolved_yaml(config), "{}", config.trained());
+  Watch watch;
+  const Bundle weights = train_run(run, config, data, {.observers = {&watch}});
+  save_bundle(run.dir() + "/weights.safetensors", weights);
+  std::printf("loss of my extractor: %.4f, then %.4f\n", watch.first, watch.last);
+  return watch.last < 0.8 * watch.first &&
+         load_bundle(run.dir()).find_as<Pooled>("skeleton") != nullptr;
 }
 
 bool trains_and_answers() {

@@ -96,6 +96,36 @@ TEST(Contact, ElbowsGoRoundWithTheArm) {
   }
 }
 
+TEST(Contact, ElbowsAreTurnedAboutTheArm) {
+  const Joints rest = tiny_joints();
+  for (const int side : {0, 1}) {
+    const auto elbow = static_cast<size_t>(kLeftElbow + side),
+               wrist = static_cast<size_t>(kLeftWrist + side),
+               shoulder = static_cast<size_t>(kLeftShoulder + side);
+    Pose pose = crouching();
+    const Mat3 bent = Eigen::AngleAxisd(side == 0 ? -1.0 : 1.0, Vec3::UnitY()).toRotationMatrix();
+    pose.local[elbow] = bent;
+    const PosedSkeleton before = forward_kinematics(rest, pose);
+    const Vec3 from = before.joints[shoulder], line = (before.joints[wrist] - from).normalized();
+    const Vec3 place = from + Eigen::AngleAxisd(0.7, line) * (before.joints[elbow] - from);
+    const Vec3 off_the_circle = place + 0.3 * line;
+    for (const Vec3& wanted : {place, off_the_circle}) {
+      Pose turned = pose;
+      turn_elbow(rest, side, wanted, &turned);
+      const PosedSkeleton after = forward_kinematics(rest, turned);
+      EXPECT_LT((after.joints[elbow] - place).norm(), 1e-9);
+      EXPECT_LT((after.joints[wrist] - before.joints[wrist]).norm(), 1e-9);
+      EXPECT_LT((after.global[wrist] - before.global[wrist]).norm(), 1e-9);
+    }
+    Joints stretched = rest;
+    stretched[elbow] = 0.5 * (rest[shoulder] + rest[wrist]) + Vec3(0, 1e-4, 0);
+    Pose straight = crouching();
+    const Mat3 held = straight.local[shoulder];
+    turn_elbow(stretched, side, from + Vec3(0, 0, 1), &straight);
+    EXPECT_LT((straight.local[shoulder] - held).norm(), 1e-2) << "a straight arm is not wrung";
+  }
+}
+
 TEST(Contact, FartherThanALegNobodyReaches) {
   const Joints rest = tiny_joints();
   Pose pose = crouching();

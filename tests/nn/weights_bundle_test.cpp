@@ -52,6 +52,35 @@ TensorFile edited(const std::string& from, const std::string& to) {
   return file;
 }
 
+/// A line of the registry as Python adds it; the network is one of ours.
+ModelType from_python(const std::string& help, const std::string& code) {
+  ModelType type = model_type("deformation/weights");
+  type.name = "mine/of_a_test", type.help = help, type.module = "mine", type.code = code;
+  return type;
+}
+
+TEST(WeightsBundle, ANetworkOfPythonNamesItsModule) {
+  register_own_model(from_python("first", "1"));
+  const Init init{{7, 1}, DType::f32};
+  Bundle set;
+  set.put("deformation.weights", testing::untrained_model("mine/of_a_test", {}, init));
+  TensorFile file = to_file(set);
+  const std::string said = file.metadata["restage"], first = identity_bytes(set);
+  EXPECT_HAS(said, R"("module":"mine")");
+  EXPECT_EQ(bundle_of(file, "w.safetensors").need("deformation.weights", "w").model,
+            "mine/of_a_test");
+  file.metadata["restage"] = test::replaced(said, "mine/of_a_test", "mine/unheard_of");
+  expect_bad(file, "needs the network 'mine/unheard_of', which the Python module 'mine' defines");
+
+  register_own_model(from_python("second", "2"));
+  EXPECT_EQ(model_type("mine/of_a_test").help, "second");
+  EXPECT_NE(identity_bytes(set), first) << "other code is another network";
+  EXPECT_THROW(register_model(from_python("third", "3")), Error);
+  ModelType ours = from_python("ours", "4");
+  ours.name = "smrm/rot6d";
+  EXPECT_THROW(register_own_model(ours), Error);
+}
+
 TEST(WeightsBundle, EverythingComesBack) {
   const Bundle set = small_set();
   const TensorFile file = to_file(set);

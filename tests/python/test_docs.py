@@ -16,3 +16,7 @@ def test_examples(walk, tmp_path, monkeypatch):
     for example in examples:
         exec(compile(example, "docs/python.md", "exec"), names)
     assert (tmp_path / "hero_walking.glb").exists() and names["loss"].item() < 2
+    assert (tmp_path / "whole.safetensors").exists() and len(names["run"].curves("motion")["step"])
+    own = next(example for example in examples if "role=\"motion\"" in example)
+    assert own.count("\n") < 60
+    assert names["distance"].item() < 0.4  # metres, of the network on the data of the program

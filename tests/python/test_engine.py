@@ -1,5 +1,4 @@
 """Tensors, the tape, ops, own ops, gradcheck, models, optimisers."""
-import copy
 import gc
 import inspect
 import json
@@ -538,17 +537,13 @@ def test_adam_refuses():
     for kind in (restage.Var, restage.Gradients, restage.Frame, restage.Model):
         with pytest.raises(TypeError):
             kind()
-    for whole in (tape, adam, p, restage.Tensor([1.0]), tape.leaf(p), restage.model("deformation/weights")):
-        with pytest.raises(TypeError):
-            copy.copy(whole)
-        with pytest.raises(TypeError):
-            copy.deepcopy(whole)
 
 
 def test_stubs_name_everything():
     import ast
     import pathlib
-    for module, stub in ((restage, "__init__"), (ops, "ops"), (restage.metrics, "metrics")):
+    for module, stub in ((restage, "__init__"), (ops, "ops"), (restage.metrics, "metrics"), (restage.data, "data"),
+                         (restage.layers, "layers"), (restage.torch, "torch"), (restage.benchmark, "benchmark")):
         tree = ast.parse((pathlib.Path(restage.__file__).parent / f"{stub}.pyi").read_text())
         named = {n.name for n in tree.body if hasattr(n, "name")} | {a.asname for n in tree.body if isinstance(n, ast.ImportFrom) for a in n.names}
         named |= {n.target.id for n in tree.body if isinstance(n, ast.AnnAssign)}

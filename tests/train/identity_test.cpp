@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <set>
+
 #include "datasets/schema.h"
 #include "nn/config/config.h"
 #include "nn/weights/bundle.h"
@@ -126,6 +128,28 @@ TEST(Identity, IsWhatItWasBeforeKeysWereAdded) {
     EXPECT_NE(with(other).front(), all_ids(ours).front()) << other;
   EXPECT_NE(all_ids("skeleton: {model: skeleton/pointnet, sizes: {widths: [8, 8, 8, 8, 8]}}\n")[0],
             all_ids("skeleton: {model: skeleton/pointnet}\n")[0]);
+}
+
+/// Keys that were added later change an id only where they change what comes out.
+TEST(Identity, NewKeysOfTheTrainerChangeItWhereTheyAct) {
+  const std::vector<std::string> plain = all_ids("seed: 5\n");
+  const auto with = [](const std::string& yaml) { return all_ids("seed: 5\n" + yaml)[0]; };
+  for (const char* same :
+       {"skeleton: {optimiser: {groups: [], clip_value: 0, sgd: {momentum: 0}}}\n",
+        "skeleton: {optimiser: {schedule: {power: 1, rise: 0.3}}}\n", "loop: {keep_best: 3}\n"})
+    EXPECT_EQ(with(same), plain[0]) << same;
+  std::set<std::string> others = {plain[0]};
+  const char* const changes[] = {
+      "skeleton: {optimiser: {groups: [{match: \"*\", rate: 0.5}]}}\n",
+      "skeleton: {optimiser: {groups: [{match: \"*\", decay: 0.5}]}}\n",
+      "skeleton: {optimiser: {clip_value: 1}}\n",
+      "skeleton: {optimiser: {kind: lion}}\n",
+      "skeleton: {optimiser: {kind: sgd, sgd: {momentum: 0.9}}}\n",
+      "skeleton: {optimiser: {schedule: {kind: polynomial, power: 2}}}\n",
+      "loop: {swa_from: 0.8}\n",
+      "loop: {export: best}\n",
+      "loop: {export: best, min_delta: 1}\n"};
+  for (const char* other : changes) EXPECT_TRUE(others.insert(with(other)).second) << other;
 }
 
 TEST(Identity, OfNetworksIsWhatItWasBeforeKeysWereAdded) {

@@ -82,6 +82,10 @@ TEST(TrainProgress, BarRedrawsInPlaceAtMostTenTimesASecond) {
     progress.note("validation 0.04");
     EXPECT_EQ(screen.text.rfind("\r\x1b[Kvalidation 0.04\n\rskeleton [", 0), 0u) << screen.text;
     screen.text.clear();
+    progress.clear();
+    progress.clear();
+    EXPECT_EQ(screen.text, "\r\x1b[K") << "room for somebody else's line";
+    screen.text.clear();
     screen.time += 1;
     progress.finish();
     EXPECT_EQ(screen.text.back(), '\n');

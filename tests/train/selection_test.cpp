@@ -5,7 +5,9 @@
 #include <gtest/gtest.h>
 #include <signal.h>
 
+#include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <sstream>
@@ -143,10 +145,100 @@ TEST_F(TrainSelection, TheBestValidationIsHandedOn) {
   const auto end = nlohmann::json::parse(lines.substr(lines.rfind('\n', lines.size() - 2) + 1));
   EXPECT_EQ(end["step"], 12);
   EXPECT_EQ(end["best_step"], 4);
-  // by less than min_delta is not better
+  // min_delta is for patience: the lowest is handed on
   loop_.selection.min_delta = 2.5;
   const std::string delta = trained("delta", scores);
-  EXPECT_TRUE(tensors_of(delta) == weights_at("delta", 2));
+  EXPECT_TRUE(tensors_of(delta) == weights_at("delta", 4));
+}
+
+TEST_F(TrainSelection, PatienceAsksForMoreThanMinDeltaAndTheLowestIsHandedOn) {
+  loop_.selection.choice = SelectionConfig::Export::best;
+  loop_.selection.patience = 2;
+  loop_.selection.min_delta = 0.5;
+  const std::vector<double> scores = {5, 4.8, 4.7, 1, 1, 1};  // at steps 2, 4, 6 ...
+  const std::string got = trained("small", scores);
+  EXPECT_EQ(latest_checkpoint(dir / "small", {"deformation"})->step, 6) << "ended early";
+  EXPECT_TRUE(tensors_of(got) == weights_at("small", 6));
+  // small steps add up to one that is large enough
+  const std::vector<double> slow = {5, 4.7, 4.4, 4.2, 4.3, 4.4};
+  const std::string steady = trained("slow", slow);
+  EXPECT_EQ(latest_checkpoint(dir / "slow", {"deformation"})->step, 10);
+  EXPECT_TRUE(tensors_of(steady) == weights_at("slow", 8));
+  for (const int64_t when : {3, 5, 7, 8}) expect_completes("slow", steady, slow, {.step = when});
+}
+
+TEST_F(TrainSelection, TheBestValidationsStayAsFilesWithStepAndFigure) {
+  const std::vector<double> scores = {5, 3, kNaN, 3, 4.25, 0.125};
+  loop_.selection.keep_best = 3;
+  const auto files = [&](const std::string& name) {
+    std::vector<std::string> out;
+    for (const auto& item : std::filesystem::directory_iterator(dir / name + "/best"))
+      out.push_back(item.path().filename().string());
+    std::sort(out.begin(), out.end());
+    return out;
+  };
+  const std::vector<std::string> wanted = {"deformation-000000004-figure-3.safetensors",
+                                           "deformation-000000008-figure-3.safetensors",
+                                           "deformation-000000012-figure-0.125.safetensors"};
+  const std::string last = trained("whole", scores);
+  EXPECT_EQ(files("whole"), wanted);
+  EXPECT_TRUE(tensors_of(read_file(dir / "whole/best/" + wanted[2])) == tensors_of(last));
+  // They open as weights, and are those of the checkpoint of that step.
+  loop_.keep_every = 4;
+  loop_.checkpoint_every = 4;
+  trained("marked", scores);
+  EXPECT_TRUE(tensors_of(read_file(dir / "marked/best/" + wanted[0])) == weights_at("marked", 4));
+  EXPECT_NE(load_bundle(dir / "marked/best/" + wanted[0]).find("deformation.weights"), nullptr);
+  // A stop changes nothing; files of steps that are taken back go.
+  for (const int64_t when : {3, 6, 9}) {
+    const std::string name = "step" + std::to_string(when);
+    expect_completes("marked", last, scores, {.step = when});
+    EXPECT_EQ(files(name), wanted) << name;
+  }
+  std::filesystem::remove(checkpoint_of(dir / "marked", "deformation", 12).path);
+  const std::string others = "marked/best/deformation-000000011-figure-0.1.safetensors";
+  write_file_atomically(dir / others, "x");
+  EXPECT_TRUE(trained(RunDir::resume(dir / "marked", {"deformation"}), scores) == last);
+  EXPECT_EQ(files("marked"), wanted);
+  loop_.selection.keep_best = 0;
+  trained("none", scores);
+  EXPECT_FALSE(std::filesystem::exists(dir / "none/best"));
+}
+
+TEST_F(TrainSelection, StochasticWeightAveragingIsTheMeanOfTheLastSteps) {
+  loop_.keep_every = 1;
+  loop_.checkpoint_every = 1;
+  trained("plain", std::vector<double>(6, 1));
+  loop_.selection.swa_from = 0.75;  // of 12 steps: the weights after 10, 11 and 12
+  const std::string got = trained("averaged", std::vector<double>(6, 1));
+  const std::string key = "deformation.weights.fc2.weight";
+  const auto numbers = [&](const TensorFile& file) {
+    return file.tensors.at(key).to_vector<float>();
+  };
+  std::vector<double> mean;
+  for (const int64_t step : {10, 11, 12}) {
+    EXPECT_TRUE(weights_at("plain", step) == weights_at("averaged", step)) << step;
+    const auto w = numbers(parse_safetensors(weights_at("plain", step), "w"));
+    mean.resize(w.size());
+    for (size_t i = 0; i < w.size(); ++i) mean[i] += static_cast<double>(w[i]) / 3;
+  }
+  const auto average = numbers(parse_safetensors(got, "weights"));
+  for (size_t i = 0; i < mean.size(); ++i) EXPECT_NEAR(average[i], mean[i], 1e-6);
+  EXPECT_TRUE(weights_at("averaged", 9) == weights_at("averaged", 9, "loop.ema."))
+      << "before, the weights themselves are validated";
+  loop_.keep_every = 0;
+  for (const int64_t when : {2, 9, 10, 11})
+    expect_completes("averaged", got, std::vector<double>(6, 1), {.step = when});
+}
+
+TEST(SelectionKeys, OneAverageOnly) {
+  SelectionConfig config;
+  const auto read = [&](const std::string& yaml) {
+    return test::refusal_of([&] { read_config(parse_yaml(yaml, "x.yaml"), config); });
+  };
+  EXPECT_HAS(read("swa_from: 0.5\nema: 0.9\n"), "x.yaml:1: 'swa_from' makes no sense with 'ema'");
+  config = {};
+  EXPECT_HAS(read("swa_from: 1\n"), "swa_from");
 }
 
 TEST_F(TrainSelection, FineTuningThatMakesWorseHandsOnWhatItBeganWith) {

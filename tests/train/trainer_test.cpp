@@ -287,6 +287,35 @@ TEST_F(TrainTrainer, ObserversSeeEverything) {
   EXPECT_EQ(seen.checkpoints, 3);
 }
 
+/// Adds a figure, and ends the first stage at its first validation.
+struct Judging final : TrainObserver {
+  bool measure(Stage& stage, int64_t, NamedValues* figures) override {
+    figures->emplace_back("mine", 1.5);
+    return stage.name() != "skeleton";
+  }
+};
+
+TEST_F(TrainTrainer, AnObserverAddsAFigureAndEndsAStage) {
+  Judging judging;
+  Counting seen;
+  TrainOptions options = kQuiet;
+  options.observers = {&judging, &seen};
+  const std::vector<std::string> stages = {"skeleton", "deformation"};
+  const auto stopping = disturbed("deformation", 3, [] { throw Killed(); });
+  {
+    RunDir run = create("judged");
+    EXPECT_THROW(train(run, stages, loop(), stopping, options), Killed);
+  }
+  EXPECT_HAS(metrics("judged"), "\"mine\":1.5");
+  EXPECT_LT(seen.steps, kSteps + 3);
+  // What was told is in the checkpoint: the resumed training does not go on with the first stage.
+  Counting later;
+  options.observers = {&later};
+  RunDir again = RunDir::resume(dir / "judged", stages);
+  train(again, stages, loop(), plain(), options);
+  EXPECT_LE(later.steps, kSteps);
+}
+
 TEST_F(TrainTrainer, AStageOfNoStepsLeavesItsNetworksAndACheckpoint) {
   struct Stopping final : TrainObserver {
     void on_step(const Stage& stage, int64_t done, const NamedValues&) override {

@@ -63,31 +63,30 @@ bool Muon::takes(const Parameter& p) {
 }
 
 Muon::Muon(const std::vector<NamedParameter>& matrices, const MuonConfig& config)
-    : config_(config) {
-  for (const NamedParameter& p : matrices) {
-    const Tensor& t = p.parameter->value;
+    : UpdateRule(matrices, {.tensors = 1}), config_(config) {
+  for (Slot& slot : slots_) {
     const auto like = std::find_if(groups_.begin(), groups_.end(), [&](const auto& group) {
-      const Tensor& m = group[0].m;
-      return m.size(0) == t.size(0) && m.size(1) == t.size(1) && m.dtype() == t.dtype();
+      const Tensor& m = group[0]->m;
+      return m.size(0) == slot.m.size(0) && m.size(1) == slot.m.size(1) &&
+             m.dtype() == slot.m.dtype();
     });
-    auto& group = like != groups_.end() ? *like : groups_.emplace_back();
-    group.push_back({p, Tensor::zeros(t.shape(), t.dtype(), t.device())});
+    (like != groups_.end() ? *like : groups_.emplace_back()).push_back(&slot);
   }
 }
 
 void Muon::step(const Gradients& gradients, double rate, double scale) {
-  for (std::vector<Slot>& group : groups_) {
+  for (const std::vector<Slot*>& group : groups_) {
     std::vector<Slot*> moving;
-    for (Slot& s : group)
-      if (gradients.find(s.of.parameter->id) != nullptr) moving.push_back(&s);
+    for (Slot* s : group)
+      if (gradients.find(s->of.parameter->id) != nullptr) moving.push_back(s);
     if (moving.empty()) continue;
-    const int64_t rows = group[0].m.size(0), columns = group[0].m.size(1);
+    const int64_t rows = group[0]->m.size(0), columns = group[0]->m.size(1);
     const auto row = [&](const Tensor& stack, size_t i) {
       const auto at = static_cast<int64_t>(i);
       return stack.rows(at, at + 1).reshape({rows, columns});
     };
-    const Tensor ahead =
-        Tensor::zeros({std::ssize(moving), rows, columns}, group[0].m.dtype(), group[0].m.device());
+    const Tensor ahead = Tensor::zeros({std::ssize(moving), rows, columns}, group[0]->m.dtype(),
+                                       group[0]->m.device());
     for (size_t i = 0; i < moving.size(); ++i) {
       const Tensor& g = *gradients.find(moving[i]->of.parameter->id);
       Tensor here = row(ahead, i);
@@ -102,17 +101,6 @@ void Muon::step(const Gradients& gradients, double rate, double scale) {
       launch(
           MixArgs{row(steps, i), moving[i]->of.parameter->value, 1, -rate * config_.step * side});
   }
-}
-
-void Muon::save(const std::string& prefix, TensorFile& file) const {
-  for (const std::vector<Slot>& group : groups_)
-    for (const Slot& s : group) file.tensors[prefix + s.of.name + ".m"] = s.m.cpu();
-}
-
-void Muon::load(const std::string& prefix, const TensorFile& file, const std::string& where) {
-  for (std::vector<Slot>& group : groups_)
-    for (Slot& s : group)
-      s.m = saved_state(file, prefix + s.of.name + ".m", s.m.shape(), where, s.m.device());
 }
 
 }  // namespace restage

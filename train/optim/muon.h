@@ -5,7 +5,7 @@
 #pragma once
 
 #include "nn/config/config_reader.h"
-#include "train/optim/parameters.h"
+#include "train/optim/update_rule.h"
 
 namespace restage {
 
@@ -19,7 +19,7 @@ void visit(V& v, MuonConfig& c) {
   v("step", c.step, "root mean square of a matrix's step, in rates", positive());
 }
 
-class Muon {
+class Muon final : public UpdateRule {
  public:
   /// Matrices of fewer rows or columns than this are bound by their shape, not by the optimiser.
   static constexpr int64_t kLeastSide = 32;
@@ -28,20 +28,12 @@ class Muon {
   static bool takes(const Parameter& p);
 
   Muon(const std::vector<NamedParameter>& matrices, const MuonConfig& config);
-  /// One update by the gradients times `scale`; a matrix without gradient stays.
-  void step(const Gradients& gradients, double rate, double scale);
-  void save(const std::string& prefix, TensorFile& file) const;
-  /// InputError if the state does not fit.
-  void load(const std::string& prefix, const TensorFile& file, const std::string& where);
+  void step(const Gradients& gradients, double rate, double scale) override;
 
  private:
-  struct Slot {
-    NamedParameter of;
-    Tensor m;
-  };
   /// Matrices of one shape form a group. Threads share the matrices of a group, not the rows of one
   /// matrix.
-  std::vector<std::vector<Slot>> groups_;
+  std::vector<std::vector<Slot*>> groups_;
   MuonConfig config_;
 };
 

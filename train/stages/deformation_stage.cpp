@@ -22,6 +22,11 @@ PairConfig held_out(PairConfig c) {
   return c;
 }
 
+/// The sizes of the networks of ours are those of the offsets, too.
+AnyConfig offset_sizes(const DeformationStageConfig& c) {
+  return c.model.sizes.holds<MlpConfig>() ? c.model.sizes : AnyConfig(MlpConfig());
+}
+
 /// Adds to `skin`, for each joint, how much of the points it moves in the data, and to `kept` how
 /// much of that it moves by the predicted weights as well.
 void add_shared_skin(const Tensor& predicted, const Tensor& truth,
@@ -43,7 +48,7 @@ DeformationStage::DeformationStage(const Config& config, const StageInput& in)
                                              RngKey{in.seed, 0}.fold("deformation/weights"))),
       offsets_(config.offsets
                    ? add_network<OffsetNet>(
-                         "deformation.offsets", "deformation/offsets", config.model.sizes,
+                         "deformation.offsets", "deformation/offsets", offset_sizes(config),
                          RngKey{in.seed, 0}.fold("deformation/offsets"),
                          {{"keep_root_rotation", config.keep_root_rotation ? "true" : "false"}})
                    : nullptr) {
@@ -67,6 +72,15 @@ DeformationBatch DeformationStage::batch_of(const PairBatch& p) const {
 Var DeformationStage::loss(Context& ctx, const PairBatch& pairs, int64_t step,
                            Tensor* posed) const {
   const DeformationBatch b = batch_of(pairs);
+  if (const OwnTraining* own = own_loss(weights_)) {
+    const auto seen = [](const Tensor& other, const Tensor& plain) {
+      return Var(other.defined() ? other : plain);
+    };
+    return own->loss(ctx,
+                     {{"rest", seen(b.seen_joints, b.rest_joints)},
+                      {"points", seen(b.seen_points, b.rest_points)}},
+                     as_vars(pairs));
+  }
   const DeformationOutput out =
       deform(ctx, *weights_, step >= config_.skinning_steps ? offsets_ : nullptr, b);
   *posed = out.posed.value;

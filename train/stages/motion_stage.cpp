@@ -164,6 +164,7 @@ OptimiserConfig of_discriminator(const MotionStageConfig& c) {
   OptimiserConfig out = c.optimiser;
   out.kind = OptimiserConfig::Kind::adam;
   out.adam = c.discriminator_adam;
+  out.groups.clear();
   return out;
 }
 }  // namespace
@@ -274,11 +275,32 @@ NamedTensors MotionStage::examples(int64_t step) const {
   return out;
 }
 
+/// The loss of a network that brings one: a mean over the windows of both kinds.
+Var MotionStage::loss_of_own(Context& ctx, const OwnTraining& own, const Batch& b) const {
+  const auto part = [&](const WindowBatch& windows, const Var& rest, int64_t count) {
+    const MotionInput in = motion_batch(windows).seen(rest);
+    NamedVars batch;
+    for (const auto& [name, tensor] : named_tensors(windows)) batch.emplace_back(name, Var(tensor));
+    const NamedVars input = {{"joints", in.joints},
+                             {"trans", in.trans},
+                             {"rest", in.rest},
+                             {"turns", in.turns},
+                             {"uncertainty", in.uncertainty},
+                             {"reframed", in.reframed}};
+    return scale(own.loss(ctx, input, batch),
+                 static_cast<double>(count) / static_cast<double>(b.self + b.cycle));
+  };
+  if (b.cycle == 0) return part(b.own, b.own.rest_b, b.self);
+  const Var cycle = part(b.windows, b.windows.rest_b, b.cycle);
+  return b.self == 0 ? cycle : part(b.own, b.own.rest_b, b.self) + cycle;
+}
+
 Differentiated MotionStage::learn(const RngKey& key, const Batch& b, bool judged) {
   const double self_part = static_cast<double>(b.self) / static_cast<double>(b.self + b.cycle);
   MotionLosses l, s;
   Differentiated out = differentiate(key, [&](Context& ctx) {
     Var total;
+    if (const OwnTraining* own = own_loss(model_)) return loss_of_own(ctx, *own, b);
     if (b.self > 0) {
       s = self_losses(ctx, *model_, supervised_batch(b.own), config_.weights);
       total = scale(s.total, self_part);
@@ -322,26 +344,27 @@ NamedValues MotionStage::step(int64_t step) {
   };
   const auto number = static_cast<uint64_t>(step);
   const int64_t cycle = cycle_windows();
-  const bool judged = adversarial() && cycle / micro_batches() > 1;
+  const bool own = own_loss(model_) != nullptr;
+  const bool judged = adversarial() && cycle / micro_batches() > 1 && !own;
   NamedValues values;
   if (judged)
     update_discriminator(key_.fold("discriminator").fold(number), rate, batch_of, &values);
   const Differentiated d = parts(*optimiser_, [&](const MicroBatch& part) {
     return learn(part.key(key_.fold(number)), batch_of(part), judged);
   });
-  optimiser_->step(d.gradients, rate);
+  optimiser_->step(d.gradients, rate, step);
   values.insert(values.begin(), {"loss", d.loss});
   if (judged) {
     // softplus(-x) = -log sigmoid(x): the batch's mean score, recovered from the loss.
     balance_ = 0.99 * balance_ + 0.01 * std::exp(-d.values[4]);
     values.push_back({"adversarial", d.values[4]});
   }
-  if (cycle > 0) {
+  if (cycle > 0 && !own) {
     values.push_back({"cycle", d.values[0]});
     values.push_back({"rotation", d.values[1]});
     values.push_back({"smoothness", d.values[2]});
   }
-  values.push_back({"self", d.values[3]});
+  if (!own) values.push_back({"self", d.values[3]});
   values.push_back({"rate", rate});
   return values;
 }

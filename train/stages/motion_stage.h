@@ -6,6 +6,7 @@
 
 #include "datasets/sampling/windows.h"
 #include "nn/losses/motion.h"
+#include "nn/models/own_training.h"
 #include "train/ahead.h"
 #include "train/artifacts/answers.h"
 #include "train/stage.h"
@@ -132,6 +133,7 @@ class MotionStage final : public Stage {
   /// The network's gradient on a micro-batch; its values are the losses cycle, rotation,
   /// smoothness, self and adversarial. `judged`: by the discriminator, too.
   Differentiated learn(const RngKey& key, const Batch& batch, bool judged);
+  Var loss_of_own(Context& ctx, const OwnTraining& own, const Batch& batch) const;
   bool adversarial() const { return config_.weights.adversarial > 0; }
   void save_more(TensorFile& file) const override;
   void load_more(const TensorFile& file, const std::string& where) override;

@@ -1,5 +1,7 @@
 #include "train/stages/registry.h"
 
+#include <algorithm>
+
 #include "autograd/base/registry.h"
 #include "train/stages/codes_stage.h"
 #include "train/stages/deformation_stage.h"
@@ -43,13 +45,39 @@ void register_stage(StageType type) { table().add(std::move(type)); }
 
 std::vector<std::string> stage_names() { return table().names(); }
 
+namespace {
+std::vector<std::string>& more_figures() {
+  static std::vector<std::string> figures;
+  return figures;
+}
+}  // namespace
+
+void set_more_figures(std::vector<std::string> figures) { more_figures() = std::move(figures); }
+
+std::vector<std::string> more_figures_of(const std::string& stage) {
+  std::vector<std::string> out;
+  for (const std::string& figure : more_figures())
+    if (figure.starts_with(stage + ".")) out.push_back(figure.substr(stage.size() + 1));
+  return out;
+}
+
+std::vector<std::string> known_figures(const StageType& type) {
+  std::vector<std::string> out;
+  for (const std::string& figure : type.figures) out.push_back(type.name + "." + figure);
+  for (const ModelType& model : models())
+    if (std::find(type.roles.begin(), type.roles.end(), model.role) != type.roles.end())
+      for (const std::string& figure : model.figures) out.push_back(type.name + "." + figure);
+  for (const std::string& figure : more_figures_of(type.name))
+    out.push_back(type.name + "." + figure);
+  return out;
+}
+
 std::string unknown_figure(const std::vector<std::string>& names) {
-  for (const std::string& name : names) {
-    bool known = false;
-    for (const StageType& type : stage_types())
-      for (const std::string& figure : type.figures) known |= name == type.name + "." + figure;
-    if (!known) return name;
-  }
+  std::vector<std::string> known;
+  for (const StageType& type : stage_types())
+    for (std::string& figure : known_figures(type)) known.push_back(std::move(figure));
+  for (const std::string& name : names)
+    if (std::find(known.begin(), known.end(), name) == known.end()) return name;
   return "";
 }
 

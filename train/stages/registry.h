@@ -25,6 +25,8 @@ struct StageType {
   /// For a forecast: makes what comes before the first step short, and returns how many times as
   /// long it would take in full. Null: there is nothing to shorten.
   double (*shorten)(AnyConfig& config) = nullptr;
+  /// Its keys of the optimiser. Null: the configuration has no member `optimiser`.
+  OptimiserConfig& (*optimiser)(AnyConfig& config) = nullptr;
 };
 
 /// The line of a stage: a class derived from Stage with a type `Config`, a static reads(Config), a
@@ -35,6 +37,11 @@ StageType stage_of(const char* name, const char* help, std::vector<std::string> 
   double (*shorten)(AnyConfig&) = nullptr;
   if constexpr (requires(typename S::Config & c) { S::shorten(c); })
     shorten = [](AnyConfig& c) { return S::shorten(c.as<typename S::Config>()); };
+  OptimiserConfig& (*optimiser)(AnyConfig&) = nullptr;
+  if constexpr (requires(typename S::Config & c) { c.optimiser.schedule; })
+    optimiser = [](AnyConfig& c) -> OptimiserConfig& {
+      return c.as<typename S::Config>().optimiser;
+    };
   return {name,
           help,
           AnyConfig(typename S::Config()),
@@ -44,7 +51,8 @@ StageType stage_of(const char* name, const char* help, std::vector<std::string> 
           [](const AnyConfig& c, const StageInput& input) -> std::unique_ptr<Stage> {
             return std::make_unique<S>(c.as<typename S::Config>(), input);
           },
-          shorten};
+          shorten,
+          optimiser};
 }
 
 const std::deque<StageType>& stage_types();
@@ -52,6 +60,13 @@ const std::deque<StageType>& stage_types();
 /// then a section of every configuration. Error if there is one of that name.
 void register_stage(StageType type);
 std::vector<std::string> stage_names();
+/// STAGE.FIGURE of all that a stage measures, that networks of its roles bring with them, and that
+/// set_more_figures() named.
+std::vector<std::string> known_figures(const StageType& type);
+/// Figures, each STAGE.FIGURE, that an observer of the next trainings adds (TrainObserver).
+void set_more_figures(std::vector<std::string> figures);
+/// Those of a stage, without its name.
+std::vector<std::string> more_figures_of(const std::string& stage);
 /// The first of `names` that is not STAGE.FIGURE of some stage; "" if there is none.
 std::string unknown_figure(const std::vector<std::string>& names);
 /// The stage of this name. InputError with the nearest known name if there is none.

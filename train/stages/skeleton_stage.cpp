@@ -130,6 +130,8 @@ Var SkeletonStage::loss_of(const SkeletonAnswer& answer, const CloudBatch& batch
 }
 
 Var SkeletonStage::loss(Context& ctx, const CloudBatch& batch, int64_t, Tensor*) const {
+  if (const OwnTraining* own = own_loss(model_))
+    return own->loss(ctx, {{"cloud", batch.points}, {"past", batch.past}}, as_vars(batch));
   const SkeletonOutput out = model_->forward(ctx, {batch.points, batch.past});
   Var total = loss_of(out, batch);
   for (const SkeletonAnswer& before : out.before) total = total + loss_of(before, batch);

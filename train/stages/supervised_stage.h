@@ -6,11 +6,20 @@
 #include <utility>
 
 #include "nn/losses/measure.h"
+#include "nn/models/own_training.h"
 #include "train/ahead.h"
 #include "train/stage.h"
 #include "train/stages/stage_input.h"
 
 namespace restage {
+
+/// All that is known of examples, as a loss of a network's own gets it.
+template <class Batch>
+NamedVars as_vars(const Batch& batch) {
+  NamedVars out;
+  for (const auto& [name, tensor] : named_tensors(batch)) out.emplace_back(name, Var(tensor));
+  return out;
+}
 
 /// A stage that learns from what a sampler gives: `batch(first, n)` are examples number `first` to
 /// `first` + n - 1. A class that derives from it adds its networks, calls begin() at the end of its
@@ -35,7 +44,7 @@ class SupervisedStage : public Stage {
       if (answer.defined()) out.values = {mean_distance(answer.cpu(), truth(here))};
       return out;
     });
-    optimiser_->step(d.gradients, rate(step));
+    optimiser_->step(d.gradients, rate(step), step);
     const std::pair<std::string, double> second = d.values.empty()
                                                       ? std::pair{"gradient_norm", d.norm}
                                                       : std::pair{"distance_mm", 1e3 * d.values[0]};

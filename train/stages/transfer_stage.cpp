@@ -71,9 +71,10 @@ void TransferStage::add_discriminator(const StageInput& in) {
   discriminator_ =
       add_network<TstDiscriminator>("discriminator", "transfer/tst_discriminator", AnyConfig(sizes),
                                     RngKey{in.seed, 0}.fold("transfer.discriminator"), {}, false);
-  if (config_.loss.train_discriminator)
-    discriminator_optimiser_ =
-        add_optimiser("discriminator_optimiser", {"discriminator"}, config_.optimiser);
+  if (!config_.loss.train_discriminator) return;
+  OptimiserConfig optimiser = config_.optimiser;
+  optimiser.groups.clear();  // they are of the network that is handed on
+  discriminator_optimiser_ = add_optimiser("discriminator_optimiser", {"discriminator"}, optimiser);
 }
 
 TransferBatch TransferStage::taken_there(const TransferBatch& here) const {
@@ -84,6 +85,8 @@ TransferBatch TransferStage::taken_there(const TransferBatch& here) const {
 
 Var TransferStage::loss(Context& ctx, const TransferBatch& pairs, int64_t step,
                         Tensor* posed) const {
+  if (const OwnTraining* own = own_loss(model_))
+    return own->loss(ctx, {{"pose", pairs.pose}, {"identity", pairs.identity}}, as_vars(pairs));
   TransferWeights weights = static_cast<const TransferWeights&>(config_.loss);
   if (step < config_.loss.metric_from) weights.metric = 0;
   return transfer_loss(ctx, *model_, {pairs.pose, pairs.identity, pairs.truth, pairs.faces},

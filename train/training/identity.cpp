@@ -22,6 +22,13 @@ Json keys_of(const C& config) {
   return Json::parse(keys_text(write_identity(config)));
 }
 
+/// The checksum of the source of a stage's network, where it is written in Python.
+std::string code_of(const Json& keys) {
+  const auto model = keys.find("model");
+  if (model == keys.end() || !model->is_string()) return "";
+  return model_type(model->get<std::string>()).code;
+}
+
 }  // namespace
 
 std::string Identities::data(const CorpusSource& source) {
@@ -74,18 +81,23 @@ std::vector<StageId> Identities::stages(const TrainConfig& config) {
                  {"seed", config.seed},
                  {"precision", static_cast<int>(config.precision)},
                  {"reads", Json::object()}};
+    if (const std::string code = code_of(json["config"]); !code.empty()) json["network"] = code;
     const SelectionConfig& selection = config.loop.selection;
     // Another device rounds in other ways.
     if (config.device != "cpu") json["device"] = config.device;
     if (config.loop.overfit_batches > 0) json["overfit_batches"] = config.loop.overfit_batches;
     if (config.loop.micro_batches > 1) json["micro_batches"] = config.loop.micro_batches;
     if (selection.ema > 0) json["ema"] = number(selection.ema);
+    if (selection.swa_from > 0) json["swa_from"] = number(selection.swa_from);
     if (selection.judges())
       json["selection"] = {{"export", static_cast<int>(selection.choice)},
                            {"patience", selection.patience},
                            {"min_delta", number(selection.min_delta)},
                            {"monitor", monitored(selection, name)},
                            {"validate_every", config.loop.validate_every}};
+    // Before, min_delta also decided which validation was the best.
+    if (selection.choice == SelectionConfig::Export::best && selection.min_delta > 0)
+      json["selection"]["best"] = "lowest";
     if (section.init) {
       json["init"] = weights(*section.init);
       json["init_names"] = section.init_names;
@@ -94,6 +106,16 @@ std::vector<StageId> Identities::stages(const TrainConfig& config) {
       json["reads"][read] = left[read];
     left[name] = short_id(json.dump());
     out.push_back({name, left[name], json.dump()});
+  }
+  return out;
+}
+
+std::vector<NetworkSource> network_sources(const TrainConfig& config) {
+  std::vector<NetworkSource> out;
+  for (const std::string& stage : config.trained()) {
+    const Json keys = keys_of(config.section(stage).config);
+    if (const std::string code = code_of(keys); !code.empty())
+      out.push_back({stage, keys["model"].get<std::string>(), code});
   }
   return out;
 }

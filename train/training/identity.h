@@ -37,4 +37,11 @@ class Identities {
   std::map<std::string, std::string> seen_;
 };
 
+/// A network in Python that a configuration trains, and a checksum of its source.
+struct NetworkSource {
+  std::string stage, model, source;
+};
+/// Those of the stages that are not taken from elsewhere, in order.
+std::vector<NetworkSource> network_sources(const TrainConfig& config);
+
 }  // namespace restage

@@ -118,6 +118,7 @@ struct TrainConfig {
     return out;
   }
 
+  std::vector<std::string> python;
   std::string name = "restage";
   std::string run_root = "runs";
   uint64_t seed = 0;
@@ -137,6 +138,12 @@ ConfigNode of_this_version(ConfigNode left);
 
 template <class V>
 void visit(V& v, TrainConfig& c) {
+  // Comes first: the names of its networks are checked below.
+  v("python", c.python, "files of Python that define networks, seen from this file's folder");
+  v.check("python", c.python.empty() || has_network_importer(),
+          "names networks that are written in Python, which this program cannot run",
+          "say 'python3 -m restage' in the place of 'restage'");
+  import_networks(c.python);
   v("name", c.name, "run directories are <run_root>/<name>-<time>-<n>");
   v.check("name", !c.name.empty() && c.name.size() <= 100 && c.name.find('/') == std::string::npos,
           "is not the name of a folder in run_root", "give 1 to 100 characters without '/'");

@@ -23,16 +23,34 @@ void check_order(const TrainConfig& config, const StageType& type, const AnyConf
 void check_monitored(const SelectionConfig& selection, Stage& stage) {
   const std::string monitor = monitored(selection, stage.name());
   if (monitor.empty()) return;
+  std::vector<std::string> figures = stage.figures();
+  if (figures.empty()) return;  // not known before the first validation
+  for (const auto& more : {stage.own_figures(), more_figures_of(stage.name())})
+    figures.insert(figures.end(), more.begin(), more.end());
   std::string known;
-  for (const std::string& figure : stage.figures()) {
+  for (const std::string& figure : figures) {
     if (figure == monitor) return;
     known += (known.empty() ? "" : ", ") + stage.name() + "." + figure;
   }
-  if (!known.empty())
-    throw InputError(
-        "loop.monitor",
-        "names '" + stage.name() + "." + monitor + "', which this configuration does not measure",
-        "name one of " + known);
+  throw InputError(
+      "loop.monitor",
+      "names '" + stage.name() + "." + monitor + "', which this configuration does not measure",
+      "name one of " + known);
+}
+
+/// Error if a network's own figure has the name of one of its stage: curves and choices would take
+/// one for the other.
+void check_own_figures(const StageType& type, Stage& stage) {
+  std::vector<std::string> known = stage.figures();
+  known.insert(known.end(), type.figures.begin(), type.figures.end());
+  for (const std::string& figure : stage.own_figures()) {
+    if (std::find(known.begin(), known.end(), figure) != known.end())
+      throw InputError("",
+                       "the network of stage '" + type.name + "' gives the figure '" + figure +
+                           "', which is measured already",
+                       "give it another name in 'figures'");
+    known.push_back(figure);
+  }
 }
 
 }  // namespace
@@ -52,6 +70,8 @@ std::unique_ptr<Stage> make_stage(const TrainConfig& config, const std::string& 
                                           data.answers, device_of(config.device)});
   stage->repeat_batches(config.loop.overfit_batches);
   stage->cut_steps(config.loop.micro_batches, data.team != nullptr ? *data.team : alone());
+  if (config.loop.gradient_noise) stage->measure_noise();
+  check_own_figures(type, *stage);
   check_monitored(config.loop.selection, *stage);
   if (section.init && section.init_names.empty())
     throw InputError(*section.init, "would give nothing: " + name + ".init_names is empty",
@@ -89,6 +109,31 @@ std::vector<StageForecast> forecast(TrainConfig config, const TrainingData& data
     so_far.add(stage->result());
     out.push_back(forecast(*stage, config.precision, validate));
     out.back().before *= left_out;
+  }
+  return out;
+}
+
+std::vector<RateSweep> find_rates(TrainConfig config, const TrainingData& data,
+                                  const RateRange& range) {
+  std::vector<RateSweep> out;
+  Bundle so_far;
+  for (const std::string& name : config.stages) {
+    const StageType& type = stage_type(name);
+    AnyConfig& section = config.section(name).config;
+    const bool trains = type.optimiser != nullptr && type.optimiser(section).steps > 0;
+    if (trains) {
+      OptimiserConfig& optimiser = type.optimiser(section);
+      optimiser.steps = range.steps;
+      optimiser.schedule = {};
+      optimiser.schedule.rate = range.from;
+      optimiser.schedule.kind = ScheduleConfig::Kind::exponential;
+      optimiser.schedule.final_fraction = range.to / range.from;
+      if (type.shorten) type.shorten(section);
+    }
+    const auto stage = make_stage(config, name, data, &so_far);
+    if (stage == nullptr) continue;
+    so_far.add(stage->result());
+    if (trains) out.push_back(sweep_rate(*stage, config.precision));
   }
   return out;
 }

@@ -4,6 +4,7 @@
 
 #include "train/artifacts/store.h"
 #include "train/forecast.h"
+#include "train/rate_sweep.h"
 #include "train/training/identity.h"
 #include "train/training/train_config.h"
 
@@ -41,6 +42,17 @@ Bundle train_run(RunDir& run, const TrainConfig& config, const TrainingData& dat
 /// of each is measured, too.
 std::vector<StageForecast> forecast(TrainConfig config, const TrainingData& data,
                                     bool validate = true);
+
+/// Where a sweep of the rate begins and ends, and its steps.
+struct RateRange {
+  double from = 1e-6, to = 10;
+  int64_t steps = 100;
+};
+/// What the loss of each stage that is trained does while its rate grows exponentially, from
+/// untrained networks (or those of `init`). A stage that reads the networks of another gets them
+/// untrained: give them with STAGE.from. Nothing is written.
+std::vector<RateSweep> find_rates(TrainConfig config, const TrainingData& data,
+                                  const RateRange& range = {});
 
 struct StoreTraining {
   Bundle bundle;

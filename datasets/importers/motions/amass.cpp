@@ -2,41 +2,28 @@
 
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
 #include <functional>
 #include <limits>
 #include <numbers>
 #include <tuple>
 
 #include "autograd/base/format.h"
-#include "datasets/importers/import_detail.h"
 #include "datasets/importers/motions/body_rotations.h"
 #include "datasets/importers/motions/body_units.h"
 #include "datasets/readers/errors.h"
 #include "datasets/readers/frames/array_frames.h"
-#include "datasets/readers/frames/folders.h"
 #include "datasets/readers/text/word_lines.h"
 
 namespace restage {
 namespace {
 
-namespace fs = std::filesystem;
-
 constexpr double kMaxSeconds = 35000;
 constexpr const char* kRates[] = {"mocap_framerate", "mocap_frame_rate", "mocap_fps", "fps",
                                   "frame_rate",      "framerate"};
 
-/// By the name of the file or its folder: SMPLX_MALE.npz, female/model.npz.
-std::string gender_of(const fs::path& file) {
-  for (const fs::path& name : {file.filename(), file.parent_path().filename()})
-    for (const char* gender : {"female", "male", "neutral"})  // "female" holds "male"
-      if (lower_case(name.string()).find(gender) != std::string::npos) return gender;
-  return "";
-}
-
 /// Text of a scalar; empty where there is none, or where it is no plain text, which is remarked:
 /// some files keep it as a Python object.
-std::string text_of(const Npz& file, const char* name, ImportReport& report) {
+std::string text_of(const ArraySource& file, const char* name, ImportReport& report) {
   if (!file.has(name)) return "";
   try {
     if (!file.header(name).is_text()) return "";
@@ -50,7 +37,7 @@ std::string text_of(const Npz& file, const char* name, ImportReport& report) {
 // ---- one file ----------------------------------------------------------------------------------
 
 /// Which model was moved; nothing if the 22 joints are those of any.
-std::optional<SmplFamily> family_of(const Npz& file, const BodyRotations& rotations,
+std::optional<SmplFamily> family_of(const ArraySource& file, const BodyRotations& rotations,
                                     ImportReport& report) {
   const std::string type = text_of(file, "surface_model_type", report);
   std::optional<SmplFamily> by_joints, by_type;
@@ -67,7 +54,7 @@ std::optional<SmplFamily> family_of(const Npz& file, const BodyRotations& rotati
 }
 
 /// 0 where there is no single number; some files keep it as a Python object.
-double number_of(const Npz& file, const char* name) {
+double number_of(const ArraySource& file, const char* name) {
   try {
     const NpyArray array = file.array(name);
     return array.is_text() || array.size() != 1 ? 0 : array[0];
@@ -77,7 +64,7 @@ double number_of(const Npz& file, const char* name) {
 }
 
 /// The file's rate; a hair beside a whole number means that number.
-double rate_of(const Npz& file, double wanted, std::string& from, ImportReport& report) {
+double rate_of(const ArraySource& file, double wanted, std::string& from, ImportReport& report) {
   from = "{fps}";
   if (wanted > 0) return wanted;
   for (const char* name : kRates) {
@@ -98,7 +85,8 @@ double rate_of(const Npz& file, double wanted, std::string& from, ImportReport& 
 }
 
 /// One person's shape: [B], [1, B], or one a frame, of which the mean is taken.
-Betas betas_of(const Npz& file, const std::string& name, size_t frames, ImportReport& report) {
+Betas betas_of(const ArraySource& file, const std::string& name, size_t frames,
+               ImportReport& report) {
   if (name.empty()) {
     report.remark("the file says no shape (betas): the mean person is taken");
     return {};
@@ -157,8 +145,9 @@ JointMap identity_map() {
 }
 
 /// The rest pose is the model's, y up; only the world that its root turns in may be another.
-SourceMotion read_motion(const Npz& file, const BodyParameters& names, BodyRotations rotations,
-                         const Joints& rest, const MotionOptions& options, ImportReport& report) {
+SourceMotion read_motion(const ArraySource& file, const BodyParameters& names,
+                         BodyRotations rotations, const Joints& rest, const MotionOptions& options,
+                         ImportReport& report) {
   if (names.trans.empty())
     throw InputError(file.path(),
                      cat("says where the joints are (", rotations.layout, "), but not the body"),
@@ -247,10 +236,23 @@ std::pair<Axis, std::string> up_by_root(const SourceMotion& motion) {
 }
 
 /// Turns the world so that y is up, and says how it is known.
-void turn_upright(SourceMotion& motion, const Npz& file, Axis given, ImportReport& report) {
+void turn_upright(SourceMotion& motion, const ArraySource& file, Axis given,
+                  const ParameterHints& hints, ImportReport& report) {
   Axis up = given;
   std::string how = to_string(given) + " ({up})";
-  if (given == Axis::automatic && is_amass_layout(file)) {
+  if (given == Axis::automatic && hints.camera) {
+    // Some have turned the camera's axes already. From above, the head is nearer, at -z.
+    const std::optional<Axis> found = up_by_spine(motion);
+    up = found == Axis::y || found == Axis::z ? *found : Axis::minus_y;
+    how = to_string(up) +
+          (up == Axis::minus_y ? ", a camera's axes" : ", where the head is on average");
+    if (up == Axis::minus_y)
+      report.remark("it is what a camera saw, whose y points down: turned about x by 180 degrees");
+  } else if (given == Axis::automatic && hints.world && !up_by_spine(motion)) {
+    up = Axis::y;
+    how = "y, taken for granted of a motion in the world";
+    report.remark("the body lies or turns over: y is taken for the way up ({up})");
+  } else if (given == Axis::automatic && is_amass_layout(file)) {
     std::tie(up, how) = up_by_root(motion);
   } else if (given == Axis::automatic) {
     const std::optional<Axis> found = up_by_spine(motion);
@@ -294,89 +296,27 @@ void check_upright(const Poses& poses, ImportReport& report) {
 
 }  // namespace
 
-// ---- body models -------------------------------------------------------------------------------
-
-BodyModels::BodyModels(const std::string& path, uint64_t max_memory)
-    : path_(path), max_memory_(max_memory) {
-  std::error_code ignored;
-  const bool folder = fs::is_directory(path, ignored);
-  if (is_pickle_name(path)) refuse_pickle(path);
-  std::optional<InputError> first;  // reason why a file is none
-  const std::vector<std::string> files =
-      folder ? files_below(path, is_npz_name) : std::vector<std::string>{path};
-  for (const std::string& file : files) {
-    try {
-      const Npz archive(file, max_memory);
-      if (!is_smpl_model(archive))
-        throw InputError(file, "is no body model (it has " + list_of(archive.names()) + ")",
-                         "give a SMPL, SMPL-H or SMPL-X model as published (.npz)");
-      entries_.push_back({file, gender_of(file), smpl_family(archive)});
-    } catch (const InputError& error) {
-      if (!folder) throw;  // a folder may hold other things too, such as MANO's hands
-      if (!first) first = error;
-    }
-  }
-  if (!entries_.empty()) return;
-  const std::string none = "holds no SMPL, SMPL-H or SMPL-X model (.npz)";
-  if (first) refuse_all(path, cat(none, " among ", files.size(), " files"), *first);
-  if (const auto pickles = files_below(path, is_pickle_name); !pickles.empty())
-    refuse_pickle(pickles[0]);
-  throw InputError(path, none, "give a model or a folder of them as {body-model}");
-}
-
-std::vector<const BodyModels::Entry*> BodyModels::usable(std::optional<SmplFamily> family,
-                                                         std::vector<std::string>& remarks) const {
-  using enum SmplFamily;
-  std::vector<const Entry*> out;
-  if (!family) {  // 22 joints: those of any
-    for (const SmplFamily any : {smplh, smplx, smpl})
-      if (out.empty()) out = of_family(any);
-    return out;
-  }
-  out = of_family(*family);
-  if (!out.empty() || *family == smplx) return out;
-  const SmplFamily other = *family == smplh ? smpl : smplh;
-  out = of_family(other);
-  if (!out.empty())
-    remarks.push_back(cat("a ", to_string(other), " model stands in for ", to_string(*family),
-                          ": their shapes are taken for the same"));
-  return out;
-}
-
-const SmplModel& BodyModels::find(std::optional<SmplFamily> family, const std::string& gender,
-                                  const std::string& clip, std::vector<std::string>& remarks) {
-  const std::vector<const Entry*> usable = this->usable(family, remarks);
-  if (usable.empty())
-    throw InputError(clip,
-                     cat("moves a ", to_string(*family), " body, ", path_, " is ",
-                         to_string(entries_[0].family), ", whose shapes are others"),
-                     cat("give a ", to_string(*family), " model as {body-model}"));
-  const std::string wanted = gender.empty() ? "neutral" : gender;
-  const Entry* chosen = usable.size() == 1 ? usable[0] : nullptr;
-  for (const Entry* entry : usable)
-    if (entry->gender == wanted) chosen = entry;
-  if (chosen == nullptr)
-    throw InputError(clip, "was fitted with a " + wanted + " body, whose model " + path_ + " lacks",
-                     "add it, or give one model for all as {body-model}");
-  if (chosen->gender != wanted && !chosen->gender.empty())
-    remarks.push_back("fitted with a " + wanted + " body, but " + chosen->path + " is " +
-                      chosen->gender + ": proportions are only roughly this person's");
-  std::unique_ptr<SmplModel>& model = loaded_[chosen->path];
-  if (!model) model = std::make_unique<SmplModel>(chosen->path, max_memory_);
-  return *model;
-}
-
-std::vector<const BodyModels::Entry*> BodyModels::of_family(SmplFamily family) const {
-  std::vector<const Entry*> out;
-  for (const Entry& entry : entries_)
-    if (entry.family == family) out.push_back(&entry);
-  return out;
-}
-
 // ---- clips -------------------------------------------------------------------------------------
 
+namespace {
+
+/// Vertices that an estimator, or SMPL itself, has made of the motion beside them; scans and meshes
+/// that were fitted have other names. Of a single pose they may be a scan with its fit.
+bool are_of_the_motion(const Npz& file, const BodyParameters& names, const CloudArray& cloud) {
+  const std::string name = lower_case(cloud.name);
+  const std::string& poses = names.poses.empty() ? names.body : names.poses;
+  return (name == "verts" || name == "vertices") && cloud.axes.sequence &&
+         file.header(poses).shape.size() > 1 && file.header(poses).shape[0] > 1;
+}
+
+}  // namespace
+
 bool is_amass_motion(const Npz& file) {
-  return is_amass_layout(file) || (body_parameters(file).moves() && !named_cloud(file));
+  if (is_amass_layout(file)) return true;
+  const BodyParameters names = body_parameters(file);
+  if (!names.moves()) return false;
+  const std::optional<CloudArray> cloud = named_cloud(file);
+  return !cloud || are_of_the_motion(file, names, *cloud);
 }
 
 bool is_amass_shape(const Npz& file) {
@@ -387,18 +327,39 @@ bool is_amass_shape(const Npz& file) {
 
 namespace {
 
+/// Frames between others, by slerp and linearly.
+void fill_missing(SourceMotion& motion, const std::vector<size_t>& missing) {
+  for (size_t k = 0; k < missing.size();) {
+    size_t end = k;  // of frames that follow each other
+    while (end < missing.size() && missing[end] == missing[k] + (end - k)) ++end;
+    const size_t before = missing[k] - 1, after = missing[k] + (end - k);
+    if (missing[k] == 0 || after >= motion.local.size()) return;  // there is nothing on one side
+    for (; k < end; ++k) {
+      const double share =
+          static_cast<double>(missing[k] - before) / static_cast<double>(after - before);
+      for (size_t j = 0; j < motion.local[before].size(); ++j)
+        motion.local[missing[k]][j] = motion.local[before][j].slerp(share, motion.local[after][j]);
+      motion.position[missing[k]][0] =
+          (1 - share) * motion.position[before][0] + share * motion.position[after][0];
+    }
+  }
+}
+
 /// The body that the file's turns are done by.
 using SkeletonOf = std::function<Joints(const BodyParameters& names, const BodyRotations&)>;
 
-Motion import_parameters(const Npz& file, const MotionOptions& options, const SkeletonOf& skeleton,
-                         ImportReport& report, std::vector<FingerTurns>* fingers) {
+Motion import_parameters(const ArraySource& file, const MotionOptions& options,
+                         const SkeletonOf& skeleton, ImportReport& report,
+                         std::vector<FingerTurns>* fingers, const ParameterHints& hints) {
   report.file = file.path();
+  for (const std::string& remark : hints.remarks) report.remark(remark);
   const BodyParameters names = body_parameters(file);
   BodyRotations rotations = read_body_rotations(file, names, fingers != nullptr);
   check_radians(file, rotations, options.force, report);
   const Joints rest = skeleton(names, rotations);
   SourceMotion motion = read_motion(file, names, std::move(rotations), rest, options, report);
-  turn_upright(motion, file, options.rest.up, report);
+  fill_missing(motion, hints.missing);
+  turn_upright(motion, file, options.rest.up, hints, report);
   const bool hands = motion.skeleton.size() > kJoints;
   if (lower_case(names.trans).find("cam_t") != std::string::npos)
     report.remark("the path is what a camera saw (" + names.trans + "): its depth is an estimate");
@@ -435,8 +396,9 @@ void report_layout(const std::optional<SmplFamily>& family, const BodyRotations&
 
 }  // namespace
 
-Motion import_amass(const Npz& file, BodyModels& models, const MotionOptions& options,
-                    ImportReport& report, std::vector<FingerTurns>* fingers) {
+Motion import_amass(const ArraySource& file, BodyModels& models, const MotionOptions& options,
+                    ImportReport& report, std::vector<FingerTurns>* fingers,
+                    const ParameterHints& hints) {
   const auto skeleton = [&](const BodyParameters& names, const BodyRotations& rotations) {
     const std::optional<SmplFamily> family = family_of(file, rotations, report);
     report_layout(family, rotations, report);
@@ -448,16 +410,26 @@ Motion import_amass(const Npz& file, BodyModels& models, const MotionOptions& op
                                   " of ", betas.size(), " betas"));
     return model.joints(betas);
   };
-  return import_parameters(file, options, skeleton, report, fingers);
+  return import_parameters(file, options, skeleton, report, fingers, hints);
 }
 
-Motion import_amass(const Npz& file, const Joints& stand_in, const MotionOptions& options,
-                    ImportReport& report, std::vector<FingerTurns>* fingers) {
+Motion import_amass(const ArraySource& file, const Joints& like, const MotionOptions& options,
+                    ImportReport& report, std::vector<FingerTurns>* fingers,
+                    const ParameterHints& hints) {
+  constexpr double kLegs = 0.8;  // metres, hip to ankle, of the mean body of such models
+  Joints stand_in = like;
+  // `trans` is where the pelvis is, but for some 25 cm that each model has its own way.
+  for (Vec3& x : stand_in) x = kLegs / std::max(leg_length(like), 1e-9) * (x - like[kPelvis]);
   const auto skeleton = [&](const BodyParameters&, const BodyRotations& rotations) {
     report_layout(family_of(file, rotations, report), rotations, report);
     return stand_in;
   };
-  return import_parameters(file, options, skeleton, report, fingers);
+  Motion out = import_parameters(file, options, skeleton, report, fingers, hints);
+  report.remark(
+      format("no body model: turns go over as they are, and the path as that of a person with legs "
+             "of %.1f m ({body-model} FILE gives this person's)",
+             kLegs));
+  return out;
 }
 
 }  // namespace restage

@@ -46,8 +46,18 @@ class BodyModels {
   std::map<std::string, std::unique_ptr<SmplModel>> loaded_;
 };
 
-/// Rotations of joints make a motion, unless the surface is there too (CAPE's v_posed), which is a
-/// scan; `betas` without rotations are a shape only (shape.npz, neutral_stagei.npz).
+/// What is known of a motion from the place where it was found.
+struct ParameterHints {
+  bool world = false;   ///< in a world, y up unless it shows another axis
+  bool camera = false;  ///< as a camera sees it: y down
+  /// Frames without this person, where another's numbers stand: interpolated.
+  std::vector<size_t> missing = {};
+  std::vector<std::string> remarks = {};
+};
+
+/// Rotations of joints make a motion, unless there is a scan, too (CAPE's v_posed); the vertices
+/// that an estimator gives beside its motion (verts) are none. `betas` without rotations are a
+/// shape only (shape.npz, neutral_stagei.npz).
 bool is_amass_motion(const Npz& file);
 bool is_amass_shape(const Npz& file);
 
@@ -57,11 +67,13 @@ bool is_amass_shape(const Npz& file);
 /// that says no rate is taken for 30 fps, with a remark. InputError: another layout, no
 /// translation, no rate, not finite, no model that fits. `fingers`: gets those of SMPL-H and
 /// SMPL-X, one a frame; stays empty where the file has none.
-Motion import_amass(const Npz& file, BodyModels& models, const MotionOptions& options,
-                    ImportReport& report, std::vector<FingerTurns>* fingers = nullptr);
-/// The same turns and path by another skeleton, where no body model is at hand: rest joints,
-/// metres, T-pose.
-Motion import_amass(const Npz& file, const Joints& stand_in, const MotionOptions& options,
-                    ImportReport& report, std::vector<FingerTurns>* fingers = nullptr);
+Motion import_amass(const ArraySource& file, BodyModels& models, const MotionOptions& options,
+                    ImportReport& report, std::vector<FingerTurns>* fingers = nullptr,
+                    const ParameterHints& hints = {});
+/// The same turns and path by another skeleton, where no body model is at hand: `like` (rest
+/// joints, T-pose) with an adult's legs, which is remarked.
+Motion import_amass(const ArraySource& file, const Joints& like, const MotionOptions& options,
+                    ImportReport& report, std::vector<FingerTurns>* fingers = nullptr,
+                    const ParameterHints& hints = {});
 
 }  // namespace restage

@@ -17,8 +17,8 @@ constexpr const char* kAxisNames[] = {"auto", "x", "-x", "y", "-y", "z", "-z"};
 constexpr LegUnit kAxisUnits[] = {{"metres", 0.4, 1.4, 1.0},
                                   {"decimetres", 4, 10, 0.1},
                                   {"inches / 0.45", 10, 20, 0.0254 / 0.45},
-                                  {"inches", 20, 50, 0.0254},
-                                  {"centimetres", 50, 140, 0.01},
+                                  {"inches", 20, 43.3, 0.0254},
+                                  {"centimetres", 43.3, 140, 0.01},
                                   {"millimetres", 400, 1400, 0.001}};
 
 }  // namespace

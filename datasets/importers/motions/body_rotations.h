@@ -22,10 +22,16 @@ struct BodyRotations {
 };
 
 /// From one array of all joints or from those of the root and the rest: axis-angle numbers ([F, 3
-/// J], [F, J, 3]) or rotation matrices ([F, J, 3, 3], of one frame [J, 3, 3]), with or without axes
-/// of length 1.
+/// J], [F, J, 3]), rotation matrices ([F, J, 3, 3], of one frame [J, 3, 3]), quaternions ([F, J,
+/// 4]: the number that is largest on average is w) or 6 numbers of a matrix ([F, J, 6]: its first
+/// two columns, one after the other or in turn, or rows, as knees and elbows bend), with or without
+/// axes of length 1, flat or not. What had to be guessed is in `layout`.
 /// InputError: other shapes and numbers of joints, no rotations, not finite.
-BodyRotations read_body_rotations(const Npz& file, const BodyParameters& names,
+BodyRotations read_body_rotations(const ArraySource& file, const BodyParameters& names,
                                   bool with_hands = false);
+
+/// How many joints an array of such a shape turns, of the root's, the others' or all; 0 for a shape
+/// that is none of a body model's.
+int64_t rotated_joints(const std::vector<int64_t>& shape);
 
 }  // namespace restage

@@ -54,7 +54,7 @@ double likely_unit(const Travel& t) {
 }
 
 /// One number, or one a frame; empty for anything else.
-std::vector<double> numbers_of(const Npz& file, const std::string& name, size_t frames) {
+std::vector<double> numbers_of(const ArraySource& file, const std::string& name, size_t frames) {
   const NpyArray array = file.array(name);
   const auto count = static_cast<size_t>(array.size());
   if (array.is_text() || (count != 1 && count != frames)) return {};
@@ -65,8 +65,9 @@ std::vector<double> numbers_of(const Npz& file, const std::string& name, size_t 
 
 }  // namespace
 
-std::vector<double> metres_of_trans(const Npz& file, const BodyParameters& names, size_t frames,
-                                    const MotionOptions& options, ImportReport& report) {
+std::vector<double> metres_of_trans(const ArraySource& file, const BodyParameters& names,
+                                    size_t frames, const MotionOptions& options,
+                                    ImportReport& report) {
   std::vector<double> out(frames, 1.0);
   if (options.scale > 0) {
     report.fact("scale of " + names.trans, format("%.6g m a unit ({scale})", options.scale));
@@ -89,7 +90,7 @@ std::vector<double> metres_of_trans(const Npz& file, const BodyParameters& names
   return out;
 }
 
-void check_radians(const Npz& file, const BodyRotations& rotations, bool force,
+void check_radians(const ArraySource& file, const BodyRotations& rotations, bool force,
                    ImportReport& report) {
   constexpr double kTurn = 2 * std::numbers::pi;
   if (rotations.largest <= kTurn * 1.01) return;

@@ -12,12 +12,13 @@ namespace restage {
 /// Metres that a unit of `trans` is, for each frame: as --scale says (`options`), else by
 /// smpl_scaling, which AIST++ divides by, else 1. What is done goes into the report, and so does a
 /// `scale` that is not applied. InputError: a smpl_scaling that is none.
-std::vector<double> metres_of_trans(const Npz& file, const BodyParameters& names, size_t frames,
-                                    const MotionOptions& options, ImportReport& report);
+std::vector<double> metres_of_trans(const ArraySource& file, const BodyParameters& names,
+                                    size_t frames, const MotionOptions& options,
+                                    ImportReport& report);
 
 /// InputError for angles that only degrees can be, unless `force`; a remark on those that turn more
 /// than once.
-void check_radians(const Npz& file, const BodyRotations& rotations, bool force,
+void check_radians(const ArraySource& file, const BodyRotations& rotations, bool force,
                    ImportReport& report);
 
 /// The same of a path of the root (`motion` upright, at the rate of the file, in what are taken for

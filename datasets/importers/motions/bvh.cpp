@@ -4,8 +4,11 @@
 #include <cmath>
 
 #include "autograd/base/format.h"
+#include "autograd/base/words.h"
+#include "datasets/importers/motions/reroot.h"
 #include "datasets/readers/errors.h"
 #include "datasets/readers/text/packed_text.h"
+#include "datasets/readers/text/text.h"
 
 namespace restage {
 namespace {
@@ -174,6 +177,14 @@ MotionClip convert_bvh(std::string_view text, const std::string& path,
   BvhFile file = parse_bvh(text, path, options.fps > 0);
   const std::optional<Profile> profile = asked_profile(options);
   Recording recording;
+  if (const int pelvis = hanging_pelvis(file.skeleton, profile ? &*profile : nullptr);
+      pelvis >= 0 && has_root_positions_alone(file)) {
+    recording.remarks.push_back(cat("its root is ", text::quote(file.skeleton.names[0]),
+                                    ", and the hips hang on the spine: its bones are hung on ",
+                                    text::quote(file.skeleton.names[static_cast<size_t>(pelvis)]),
+                                    ", and each keeps its turn"));
+    file = rerooted(file, pelvis);
+  }
   recording.names = name_joints(file.skeleton, path, profile ? &*profile : nullptr);
   recording.format = "BVH";
   recording.rate_of_file = rate_text(file);

@@ -34,6 +34,7 @@ struct MotionOptions {
   bool fingers = false;  ///< read them, too
   /// Bone names: a built-in profile's name or a YAML file (profiles.h); empty: the one that fits.
   std::string profile;
+  std::string layout;  ///< of joints without rotations (joints/layouts.h); empty: the one that fits
   /// Empty id: the file's name. Empty subject: from the file's name (07_01 -> 07), else the id.
   std::string id, subject, split = "train", action;
 };

@@ -6,10 +6,13 @@
 
 #include "autograd/base/format.h"
 #include "datasets/builtin/body_shape.h"
+#include "datasets/importers/joints/solve.h"
 #include "datasets/importers/motions/amass.h"
 #include "datasets/importers/motions/amc.h"
 #include "datasets/importers/motions/bvh.h"
+#include "datasets/importers/motions/estimated.h"
 #include "datasets/importers/rigs/gltf_character.h"
+#include "datasets/readers/arrays/nested_file.h"
 #include "datasets/readers/errors.h"
 #include "datasets/readers/text/text.h"
 #include "datasets/schema.h"
@@ -25,17 +28,6 @@ bool is_motions_name(const std::string& path) { return text::ends_in(path, {".h5
 
 double lowest_foot_of(const Joints& joints) {
   return std::min({joints[7].y(), joints[8].y(), joints[10].y(), joints[11].y()});
-}
-
-/// Puts the rest pose upright over the place where frames have their floor: its feet stand on it.
-/// A rest pose that stands within 5 cm of it is believed.
-void stand_on_floor(SkeletonTake& p) {
-  constexpr double kNear = 0.05;  // metres
-  std::vector<double> lowest;
-  for (const PosedSkeleton& frame : p.frames) lowest.push_back(lowest_foot(frame));
-  const double lift = floor_height(std::move(lowest)) - lowest_foot_of(p.rest);
-  if (std::abs(lift) < kNear) return;
-  for (Vec3& x : p.rest) x.y() += lift;
 }
 
 SkeletonTake of_motion(const Motion& motion, ImportReport report,
@@ -85,27 +77,42 @@ SkeletonTake of_motions(const std::string& path, const TakeOptions& options) {
 }
 
 SkeletonTake of_parameters(const std::string& path, const TakeOptions& options) {
-  constexpr double kLegs = 0.8;  // metres, hip to ankle, of the mean body of such models
-  const Npz file(path);
+  const EstimatedMotion from = one_person(read_estimated(path), options.person, path);
   MotionOptions motion = options.motion;
   motion.id = std::filesystem::path(path).stem().string();
   ImportReport report;
   std::vector<FingerTurns> fingers;
+  if (!from.person.empty()) report.fact("person", from.person);
   if (!options.body_model.empty()) {
     BodyModels models(options.body_model);
-    const Motion read = import_amass(file, models, motion, report, &fingers);
+    const Motion read = import_amass(*from.arrays, models, motion, report, &fingers, from.hints);
     return of_motion(read, std::move(report), std::move(fingers));
   }
   const Joints like = options.like.value_or(shape_joints({}));
-  Joints stand_in = like;
-  // `trans` is where the pelvis is, but for some 25 cm that each model has its own way.
-  for (Vec3& x : stand_in) x = kLegs / std::max(leg_length(like), 1e-9) * (x - like[kPelvis]);
-  const Motion read = import_amass(file, stand_in, motion, report, &fingers);
-  report.remark(
-      format("no body model: turns go over as they are, and the path as that of a person with legs "
-             "of %.1f m ({body-model} FILE gives this person's)",
-             kLegs));
+  const Motion read = import_amass(*from.arrays, like, motion, report, &fingers, from.hints);
   return of_motion(read, std::move(report), std::move(fingers));
+}
+
+JointFileOptions joint_options(const std::string& layout, const std::string& person) {
+  JointFileOptions out;
+  out.layout = layout;
+  out.person = person;
+  return out;
+}
+
+SkeletonTake of_joints(const JointRecording& joints, const std::string& path,
+                       MotionOptions options) {
+  options.id = std::filesystem::path(path).stem().string();
+  ImportReport report;
+  report.file = path;
+  SolvedJoints solved = solve_joints(joints, options, report);
+  return of_motion(solved.motion, std::move(report));
+}
+
+/// A body model's parameters in an archive; of joints beside them nobody is asked. What a pickle
+/// holds is known when it has been looked at for joints.
+bool is_estimated(const std::string& path, const std::string& layout) {
+  return layout.empty() && text::ends_in(path, {".npz"}) && holds_estimates(path);
 }
 
 bool holds_motions(const std::string& path) {
@@ -113,14 +120,6 @@ bool holds_motions(const std::string& path) {
     return inspect(path).counts.contains("motions");
   } catch (const InputError&) {
     return false;  // what reads clouds says what is wrong
-  }
-}
-
-bool holds_parameters(const std::string& path) {
-  try {
-    return is_amass_motion(Npz(path));
-  } catch (const InputError&) {
-    return false;
   }
 }
 
@@ -167,6 +166,9 @@ SkeletonTake of_gltf(const std::string& path, const MotionOptions& options,
   out.rest = out.figure ? out.figure->rest() : t_pose_joints(rig);
   check_handedness(out.rest, options.force, out.report);
   const GltfClip& clip = name.empty() ? first_clip(file, rig) : find_clip(file, name);
+  if (name.empty() && file.clips.size() > 1)
+    out.report.remark(cat("holds ", file.clips.size(), " animations: ", text::quote(clip.name),
+                          " is taken, the first that moves ({clip} NAME for another)"));
   out.name = clip.name;
   out.frames = clip_poses(file, rig, clip, clip_frames(file, clip), out.report);
   out.own_floor = true;
@@ -184,12 +186,26 @@ SkeletonTake of_gltf(const std::string& path, const MotionOptions& options,
 
 }  // namespace
 
-bool holds_take(const std::string& path, const std::string& bones, std::string* why) {
+void stand_on_floor(SkeletonTake& p) {
+  constexpr double kNear = 0.05;  // metres
+  std::vector<double> lowest;
+  for (const PosedSkeleton& frame : p.frames) lowest.push_back(lowest_foot(frame));
+  const double lift = floor_height(std::move(lowest)) - lowest_foot_of(p.rest);
+  if (std::abs(lift) < kNear) return;
+  for (Vec3& x : p.rest) x.y() += lift;
+}
+
+bool holds_take(const std::string& path, const std::string& bones, std::string* why,
+                const std::string& layout) {
   if (is_recording(path)) return true;
   std::error_code error;
-  if (std::filesystem::is_directory(path, error)) return false;
+  const bool folder = std::filesystem::is_directory(path, error);
+  if (!folder && is_estimated(path, layout)) return true;
+  if (find_joint_recording(path, joint_options(layout, "0"))) return true;  // whoever it is
+  if (folder) refuse_recordings_in(path, joint_options(layout, "0"));
+  if (folder) return false;
+  if (may_hold_estimates(path)) return holds_estimates(path);
   if (is_motions_name(path)) return holds_motions(path);
-  if (text::ends_in(path, {".npz"})) return holds_parameters(path);
   if (!is_gltf_name(path)) return false;
   const Gltf file = read_gltf(path);
   if (file.clips.empty()) {
@@ -235,6 +251,10 @@ SkeletonTake read_any(const std::string& path, const TakeOptions& options) {
   if (is_motions_name(path)) return of_motions(path, options);
   if (!options.clip.empty())
     throw InputError(path, "is one recording, of which no clip can be chosen", "leave {clip} out");
+  if (is_estimated(path, options.motion.layout)) return of_parameters(path, options);
+  if (const auto joints =
+          find_joint_recording(path, joint_options(options.motion.layout, options.person)))
+    return of_joints(*joints, path, options.motion);
   return is_recording(path) ? of_recording(path, options) : of_parameters(path, options);
 }
 

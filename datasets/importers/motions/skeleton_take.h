@@ -24,11 +24,13 @@ struct SkeletonTake {
 };
 
 /// Whether the file holds a skeleton that moves: BVH and AMC recordings by their names; a glTF file
-/// by what is in it: an animation, and a rig that find_rig() accepts; an NPZ with a body model's
-/// parameters (AMASS and its kin); an HDF5 file of motions. `why`: of an animated surface whose rig
-/// is not accepted, the reason. InputError where there is no surface either.
-/// `bones`: as MotionOptions::profile; a rig that is named by the user is taken or refused.
-bool holds_take(const std::string& path, const std::string& bones = "", std::string* why = nullptr);
+/// by what is in it: an animation, and a rig that find_rig() accepts; a file with a body model's
+/// parameters (AMASS and its kin, estimated.h); an HDF5 file of motions; positions of joints
+/// without rotations (joints/joint_file.h), in the order `layout` if that is not empty. `why`: of
+/// an animated surface whose rig is not accepted, the reason. InputError where there is no surface
+/// either. `bones`: as MotionOptions::profile; a rig that is named by the user is taken or refused.
+bool holds_take(const std::string& path, const std::string& bones = "", std::string* why = nullptr,
+                const std::string& layout = "");
 
 struct TakeOptions {
   MotionOptions motion =
@@ -40,6 +42,7 @@ struct TakeOptions {
   /// Of a body model's parameters: the model or a folder of models (BodyModels). Empty: `like`.
   std::string asf = {};  ///< of an AMC file; empty: the one beside it
   std::string body_model = {};
+  std::string person = {};  ///< whose, where a file has several people's motions
   /// Rest joints of who performs; nothing: an average built-in body. Where parameters come without
   /// a body model, a skeleton of this shape with an adult's legs stands in: turns go over as they
   /// are.
@@ -47,6 +50,10 @@ struct TakeOptions {
 };
 
 SkeletonTake read_take(const std::string& path, const TakeOptions& options);
+
+/// Puts the rest pose upright over the place where frames have their floor: its feet stand on it.
+/// A rest pose that stands within 5 cm of it is believed.
+void stand_on_floor(SkeletonTake& take);
 
 /// Lifts or lowers a recording as a whole where whoever performs it would float or sink: a
 /// recording does not say where its floor is, and rest poses have their feet in many ways. Within 3

@@ -101,6 +101,14 @@ class Finder {
     const int out = plainest(path, sure);
     return out >= 0 ? out : plainest(path, otherwise);
   }
+  /// The collar on a path; of several none that lies where its parent does.
+  int collar_of(const std::vector<int>& path) const {
+    std::vector<int> apart;
+    for (const int b : path)
+      if (!skeleton_.offsets[b].isZero()) apart.push_back(b);
+    const int out = plainest(apart, BonePart::collar, BonePart::shoulder);
+    return out >= 0 ? out : plainest(path, BonePart::collar, BonePart::shoulder);
+  }
   static std::vector<int> below(const std::vector<int>& path, int bone) {
     return {std::find(path.begin(), path.end(), bone) + 1, path.end()};
   }
@@ -183,7 +191,7 @@ class Finder {
       for (const int b : rest)
         if (words_[b].part == BonePart::shoulder) out.upper = b;
     if (out.upper < 0) return out.lacks = 1, out;
-    out.root = plainest(above(path, out.upper), BonePart::collar, BonePart::shoulder);
+    out.root = collar_of(above(path, out.upper));
     return weighed(out);
   }
 
@@ -224,7 +232,7 @@ class Finder {
                  lower_length = (place(lower) - place(end)).norm();
     if (std::max(upper_length, lower_length) > kMost * std::min(upper_length, lower_length))
       return out;
-    found.root = plainest(above(rest, found.upper), BonePart::collar, BonePart::shoulder);
+    found.root = collar_of(above(rest, found.upper));
     return weighed(found);
   }
 
@@ -344,7 +352,10 @@ class Finder {
     }
     if (best < 0) best = last_of_spine();
     out_.bones[kHead] = best;
-    if (best < 0 || two) lacks(kHead, two ? "two of its bones may be the head" : "");
+    const char* why = two                    ? "two of its bones may be the head"
+                      : out_.missing.empty() ? "a skeleton without one needs it at the neck's end"
+                                             : "";
+    if (best < 0 || two) lacks(kHead, why);
   }
 
   /// The head of a skeleton that only counts the bones of its trunk, as Rigify's does ("spine" to

@@ -164,9 +164,38 @@ bool moves_joints(const Gltf& file, const GltfRig& rig, const GltfClip& clip) {
                      [&](const GltfTrack& track) { return counts[track.node]; });
 }
 
+namespace {
+
+/// Whether a joint goes anywhere in it, or turns: exporters leave still clips called "Take 001".
+bool goes_on(const Gltf& file, const GltfRig& rig, const GltfClip& clip) {
+  constexpr double kStill = 1e-3;  // radians, and shares of the leg
+  constexpr int64_t kLooks = 24;
+  const int64_t frames = clip_frames(file, clip);
+  std::optional<PosedSkeleton> first;
+  const double leg = std::max(leg_length(t_pose_joints(rig)), 1e-9);
+  for (int64_t look = 0; look < std::min(kLooks, frames); ++look) {
+    const int64_t f = look * (frames - 1) / std::max<int64_t>(1, std::min(kLooks, frames) - 1);
+    const PosedSkeleton pose =
+        rig_pose(rig, gltf_pose(file, clip, clip.begin + static_cast<double>(f) / kFps));
+    if (!first) first = pose;
+    for (size_t j = 0; j < kJoints; ++j) {
+      const bool moved = (pose.joints[j] - first->joints[j]).norm() > kStill * leg;
+      if (moved || (pose.global[j] - first->global[j]).norm() > kStill) return true;
+    }
+  }
+  return false;
+}
+
+}  // namespace
+
 const GltfClip& first_clip(const Gltf& file, const GltfRig& rig) {
-  for (const GltfClip& clip : file.clips)
-    if (moves_joints(file, rig, clip)) return clip;
+  const GltfClip* still = nullptr;
+  for (const GltfClip& clip : file.clips) {
+    if (!moves_joints(file, rig, clip)) continue;
+    if (goes_on(file, rig, clip)) return clip;
+    if (still == nullptr) still = &clip;
+  }
+  if (still != nullptr) return *still;
   throw InputError(file.path, "holds no animation that moves its bones",
                    "export it with its animation");
 }

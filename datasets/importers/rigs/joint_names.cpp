@@ -21,6 +21,8 @@ namespace {
 /// Those that cannot be placed.
 constexpr int kRequired[] = {0, 1, 2, 4, 5, 7, 8, 15, 16, 17, 18, 19, 20, 21};
 
+constexpr std::array<int, 6> kLegJoints = {1, 2, 4, 5, 7, 8}, kArmJoints = {16, 17, 18, 19, 20, 21};
+
 constexpr const char* kNameThem =
     "say which bone is which joint in a file, and give it with {bones} names.yaml "
     "(docs/formats.md)";
@@ -116,9 +118,16 @@ bool hang_together(const BoneTree& tree, const Bones& bones) {
   const auto on = [&](int j, int above) {
     return bones[j] < 0 || bones[above] < 0 || hangs_on(tree.skeleton, bones[j], bones[above]);
   };
+  // Of a rig whose makers hung the limbs on its root the upper arms hang beside the collars.
+  const auto beside = [&](int j) {
+    const int collar = bones[kParents[j]];
+    if (j < 16 || j > 17 || collar < 0) return false;
+    const int above = tree.skeleton.parents[bones[j]];
+    return above == tree.skeleton.parents[collar] && hangs_on(tree.skeleton, bones[0], above);
+  };
   for (const int side : {0, 1})
     for (const int j : {4, 7, 10, 16, 18, 20})
-      if (!on(j + side, kParents[j + side])) return false;
+      if (!on(j + side, kParents[j + side]) && !beside(j + side)) return false;
   if (!on(kSpine2, kSpine1) || !on(kSpine3, kSpine2) || !on(kSpine3, kSpine1)) return false;
   const int chest = chest_of(tree, bones);
   if (chest == bones[0] || !hangs_on(tree.skeleton, chest, bones[0]))
@@ -295,6 +304,21 @@ std::vector<std::string> words_for(const BoneTree& tree, const FoundJoints& foun
   const bool any = std::any_of(tree.words.begin(), tree.words.end(), [](const BoneWords& words) {
     return words.part != BonePart::none && !words.helper;
   });
+  const auto lacks = [&](int j) {
+    return std::count(found.missing.begin(), found.missing.end(), j) > 0;
+  };
+  const bool no_legs =
+      std::all_of(kLegJoints.begin(), kLegJoints.end(), lacks) &&
+      std::none_of(kArmJoints.begin(), kArmJoints.end(), lacks) &&
+      std::none_of(tree.words.begin(), tree.words.end(), [](const BoneWords& words) {
+        return words.part == BonePart::thigh || words.part == BonePart::shin ||
+               words.part == BonePart::leg || words.part == BonePart::ankle ||
+               words.part == BonePart::foot;
+      });
+  if (any && no_legs)
+    throw UnknownSkeleton(
+        where, cat("is half a body: none of its ", tree.skeleton.size(), " bones is of a leg"),
+        "record the whole body, or give it legs in Blender, at rest");
   std::string what;
   if (!any) {
     std::vector<std::string> some;
@@ -369,6 +393,22 @@ const Profile& no_profile() {
   return out;
 }
 
+/// A bone that carries the hips from far away, as a root on the ground does, turns with the pelvis
+/// but is not where one is: the joint is placed over the middle of the hips, as people have it.
+void place_among_hips(const SourceSkeleton& skeleton, JointMap& map) {
+  constexpr double kFar = 0.4, kAbove = 0.1;  // of a leg
+  const std::vector<Vec3> zero = zero_positions(skeleton);
+  const auto at = [&](size_t j) -> Vec3 {
+    return zero[static_cast<size_t>(map[j].joint)] + map[j].offset;
+  };
+  const double leg =
+      (at(kLeftHip) - at(kLeftKnee)).norm() + (at(kLeftKnee) - at(kLeftAnkle)).norm();
+  const Vec3 hips = 0.5 * (at(kLeftHip) + at(kRightHip)), away = at(kPelvis) - hips;
+  if (away.norm() < kFar * leg) return;
+  const Vec3 up = (at(kSpine3) - hips).normalized();
+  map[kPelvis].offset += kAbove * leg * up - away;
+}
+
 /// The pelvis turns with the lowest bone that carries both legs, if that hangs on it: the first of
 /// the spine in 3ds Max, Daz's `pelvis` below `hip`. Where the legs hang beside it, on a bone that
 /// carries both and lies nearer to it than the knees do, that one is moved.
@@ -393,19 +433,12 @@ NamedJoints turned_with_legs(const SourceSkeleton& skeleton, NamedJoints names) 
       names.hips = legs;
     }
   }
+  place_among_hips(skeleton, names.map);
   return names;
 }
 
-}  // namespace
-
-void check_one_person(const SourceSkeleton& skeleton, const std::string& where) {
-  const std::vector<std::string> plain = undecorated(skeleton.names);
-  for (size_t language = 0; language < bone_dictionaries().size(); ++language)
-    only_person(bone_tree(skeleton, plain, language), where);
-}
-
-NamedJoints name_joints(const SourceSkeleton& skeleton, const std::string& where,
-                        const Profile* profile) {
+NamedJoints name_known(const SourceSkeleton& skeleton, const std::string& where,
+                       const Profile* profile) {
   const std::vector<std::string> plain = undecorated(skeleton.names);
   const BoneNames names(skeleton, plain, profile != nullptr);
   const auto placed = [&](const BoneTree& tree, const Profile& by, const Bones& bones) {
@@ -426,6 +459,55 @@ NamedJoints name_joints(const SourceSkeleton& skeleton, const std::string& where
     throw_not_found(reading.tree, reading.found, plain, where);
   }
   return placed(reading.tree, no_profile(), reading.found.bones);
+}
+
+/// Where the head is of a skeleton without a bone for it: the end of its neck.
+struct NeckEnd {
+  int neck = -1;  ///< -1: there is none, or the head has a bone
+  Vec3 end = Vec3::Zero();
+};
+
+/// Nothing where a word of any language may be the head's, or several necks end.
+NeckEnd neck_end(const SourceSkeleton& skeleton, const std::vector<std::string>& plain) {
+  NeckEnd out;
+  const BoneTree tree = bone_tree(skeleton, plain, 0);
+  for (size_t language = 0; language < bone_dictionaries().size(); ++language)
+    for (const BoneWords& words : bone_tree(skeleton, plain, language).words)
+      if (words.part == BonePart::head && !words.end) return {};
+  for (size_t b = 0; b < skeleton.size(); ++b) {
+    const BoneWords& words = tree.words[b];
+    if (words.part != BonePart::neck || words.side != BoneWords::middle) continue;
+    const int above = skeleton.parents[b];
+    const bool is_end =
+        words.end && above >= 0 && tree.words[static_cast<size_t>(above)].part == BonePart::neck;
+    const bool has_end = !words.helper && skeleton.has_end[b] && !skeleton.ends[b].isZero();
+    if (!is_end && !has_end) continue;
+    if (out.neck >= 0) return {};
+    out = is_end ? NeckEnd{above, skeleton.offsets[b]}
+                 : NeckEnd{static_cast<int>(b), skeleton.ends[b]};
+  }
+  return out;
+}
+
+}  // namespace
+
+void check_one_person(const SourceSkeleton& skeleton, const std::string& where) {
+  const std::vector<std::string> plain = undecorated(skeleton.names);
+  for (size_t language = 0; language < bone_dictionaries().size(); ++language)
+    only_person(bone_tree(skeleton, plain, language), where);
+}
+
+NamedJoints name_joints(const SourceSkeleton& given, const std::string& where,
+                        const Profile* profile) {
+  SourceSkeleton skeleton = given;
+  const NeckEnd head = profile == nullptr ? neck_end(given, undecorated(given.names)) : NeckEnd{};
+  if (head.neck >= 0) skeleton.add("Head", head.neck, head.end);
+  NamedJoints out = name_known(skeleton, where, profile);
+  if (head.neck < 0) return out;
+  for (SourceJoint& joint : out.map)
+    if (joint.joint == std::ssize(given.names)) joint = {head.neck, Vec3(head.end + joint.offset)};
+  out.placed.insert(std::upper_bound(out.placed.begin(), out.placed.end(), int{kHead}), kHead);
+  return out;
 }
 
 }  // namespace restage

@@ -98,7 +98,8 @@ class Placer {
   /// who stands as the zero pose does.
   Vec3 toe_of(int ankle) const {
     const size_t source = static_cast<size_t>(joint(ankle).joint);
-    if (skeleton_.has_end[source]) return at(ankle) + skeleton_.ends[source];
+    if (skeleton_.has_end[source] && !skeleton_.ends[source].isZero())
+      return at(ankle) + skeleton_.ends[source];
     for (size_t j = 0; j < skeleton_.size(); ++j)
       if (skeleton_.parents[j] == static_cast<int>(source) && !tree_.words[j].helper &&
           !skeleton_.offsets[j].isZero())

@@ -33,14 +33,15 @@ std::string find(const std::vector<std::string>& all,
 
 BodyParameters body_parameters(const std::vector<std::string>& names) {
   BodyParameters out;
-  out.poses = find(names, {"poses_world", "pose_world", "poses", "pose", "thetas", "theta",
-                           "fullpose", "full_pose", "rotmat", "rotmats", "rotation_matrices"});
+  out.poses =
+      find(names, {"poses_world", "pose_world", "poses", "pose", "thetas", "theta", "fullpose",
+                   "full_pose", "rotmat", "rotmats", "rotation_matrices", "local_rot_mats"});
   out.orient = find(names, {"root_orient", "global_orient", "root_orientation",
                             "global_orientation", "root_pose", "global_rot", "root_rot", "orient"});
   out.body = find(names, {"pose_body", "body_pose"});
   out.trans = find(names, {"trans_world", "trans", "transl", "translation", "root_trans",
                            "root_transl", "root_translation", "global_trans", "global_transl",
-                           "th_trans", "cam_trans", "cam_t"});
+                           "th_trans", "root_positions", "cam_trans", "cam_t"});
   out.betas = find(names, {"betas", "beta", "shape", "shapes"});
   for (const std::string& name : names) {
     if (lower_case(name) == "smpl_scaling") out.scaling = name;
@@ -49,9 +50,15 @@ BodyParameters body_parameters(const std::vector<std::string>& names) {
   return out;
 }
 
-BodyParameters body_parameters(const Npz& file) { return body_parameters(file.names()); }
+bool is_body_parameter(const std::string& name) {
+  const BodyParameters of = body_parameters(std::vector<std::string>{name});
+  return of.moves() || !of.orient.empty() || !of.body.empty() || !of.trans.empty() ||
+         !of.betas.empty();
+}
 
-void refuse_incomplete(const Npz& file, const BodyParameters& names) {
+BodyParameters body_parameters(const ArraySource& file) { return body_parameters(file.names()); }
+
+void refuse_incomplete(const ArraySource& file, const BodyParameters& names) {
   if (names.moves() || (names.orient.empty() && names.body.empty())) return;
   if (names.body.empty())
     throw InputError(file.path(),
@@ -64,6 +71,6 @@ void refuse_incomplete(const Npz& file, const BodyParameters& names) {
                    "add root_orient [F, 3], or all joints as poses [F, 66] or [F, 156]");
 }
 
-bool is_amass_layout(const Npz& file) { return file.has("poses") && file.has("trans"); }
+bool is_amass_layout(const ArraySource& file) { return file.has("poses") && file.has("trans"); }
 
 }  // namespace restage

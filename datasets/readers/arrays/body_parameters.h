@@ -1,11 +1,11 @@
-// Parameters of a body model (SMPL and its kin) in an NPZ: the many names that data sets and
+// Parameters of a body model (SMPL and its kin): the many names that data sets and
 // estimators give them.
 #pragma once
 
 #include <string>
 #include <vector>
 
-#include "datasets/readers/arrays/npz.h"
+#include "datasets/readers/arrays/array_source.h"
 
 namespace restage {
 
@@ -22,15 +22,18 @@ struct BodyParameters {
   bool moves() const { return !poses.empty() || (!orient.empty() && !body.empty()); }
 };
 
-BodyParameters body_parameters(const Npz& file);
+BodyParameters body_parameters(const ArraySource& file);
 /// The same of a list of names, such as those of the data sets of an HDF5 file.
 BodyParameters body_parameters(const std::vector<std::string>& names);
 
+/// Whether an array of this name would be rotations, a path or a shape.
+bool is_body_parameter(const std::string& name);
+
 /// InputError for a file that has rotations of the root and not of the other joints, or the other
 /// way round, naming what is missing.
-void refuse_incomplete(const Npz& file, const BodyParameters& names);
+void refuse_incomplete(const ArraySource& file, const BodyParameters& names);
 
 /// Whether it is laid out as AMASS is: `poses` and `trans`.
-bool is_amass_layout(const Npz& file);
+bool is_amass_layout(const ArraySource& file);
 
 }  // namespace restage

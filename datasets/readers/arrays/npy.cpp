@@ -66,10 +66,12 @@ const Number* number_of(char kind, size_t width) {
 void read_type(const std::string& type, const std::string& where, NpyHeader& out) {
   const size_t at = !type.empty() && std::strchr("<>|=", type[0]) != nullptr ? 1 : 0;
   const std::string digits = type.substr(std::min(type.size(), at + 1));
-  if (type.size() > at && type[at] == 'O')
-    throw InputError(where,
-                     "holds Python objects (a pickle), which are never read: they can run code",
-                     "save plain numbers (docs/formats.md shows how)");
+  if (type.size() > at && type[at] == 'O') {
+    out.is_object = true;
+    out.kind = 'O';
+    out.width = 0;
+    return;
+  }
   int64_t width = 0;
   if (type.size() <= at || !text::parse(digits, width) || width < 0 || width > (1 << 16))
     unreadable(where);
@@ -169,7 +171,19 @@ void add_utf8(std::string& out, uint32_t code) {
 
 }  // namespace
 
-NpyHeader read_npy_header(ByteStream& in) {
+NpyHeader npy_header_of(const std::string& type, const std::vector<int64_t>& shape,
+                        const std::string& where) {
+  NpyHeader out;
+  read_type(type, where, out);
+  if (shape.size() > kMaxAxes ||
+      std::any_of(shape.begin(), shape.end(), [](auto n) { return n < 0; }))
+    throw InputError(where, "claims the impossible shape " + shape_text(shape), kSaveWithNumpy);
+  out.shape = shape;
+  count_elements(out, where);
+  return out;
+}
+
+NpyHeader read_npy_header(ByteStream& in, bool objects) {
   char magic[8];
   if (in.left() >= sizeof magic) in.read(magic, sizeof magic);
   if (in.size() < sizeof magic || std::memcmp(magic, "\x93NUMPY", 6) != 0)
@@ -185,6 +199,10 @@ NpyHeader read_npy_header(ByteStream& in) {
   in.read(text.data(), n);
   NpyHeader out = parse_header(text, in.where());
   count_elements(out, in.where());
+  if (out.is_object && objects) return out;
+  if (out.is_object)
+    throw InputError(in.where(), "holds Python objects (a pickle) and no array of numbers",
+                     "save plain numbers (docs/formats.md shows how)");
   if (out.bytes() != in.left())
     throw InputError(
         in.where(),
@@ -203,13 +221,16 @@ NpyArray::NpyArray(ByteStream& in, uint64_t max_memory)
   bytes_ = in.take(header_.bytes());
 }
 
-bool NpyArray::is_shaped(const std::vector<int64_t>& wanted) const {
-  return !is_text() &&
-         std::equal(wanted.begin(), wanted.end(), shape().begin(), shape().end(),
-                    [](int64_t want, int64_t length) { return want < 0 || want == length; });
+NpyArray::NpyArray(NpyHeader header, std::vector<char> bytes, std::string where)
+    : header_(std::move(header)), bytes_(std::move(bytes)), where_(std::move(where)) {
+  if (bytes_.size() != header_.bytes())
+    throw InputError(where_,
+                     cat("should hold ", header_.bytes(), " bytes for its shape ",
+                         shape_text(header_.shape), ", but holds ", bytes_.size()),
+                     "it is damaged: copy or save it again");
 }
 
-double NpyArray::operator[](int64_t i) const {
+size_t NpyArray::place(int64_t i) const {
   if (header_.fortran) {  // from the last axis, the fastest in C order, to the first
     int64_t rest = i, stride = header_.count;
     i = 0;
@@ -220,8 +241,37 @@ double NpyArray::operator[](int64_t i) const {
       rest /= n;
     }
   }
-  return header_.number(bytes_.data() + static_cast<size_t>(i) * header_.width);
+  return static_cast<size_t>(i) * header_.width;
 }
+
+std::vector<char> NpyArray::in_order() const {
+  if (!header_.fortran) return bytes_;
+  std::vector<char> out(bytes_.size());
+  for (int64_t i = 0; i < header_.count; ++i)
+    std::memcpy(out.data() + static_cast<size_t>(i) * header_.width, bytes_.data() + place(i),
+                header_.width);
+  return out;
+}
+
+NpyArray NpyArray::part(int64_t i) const {
+  NpyHeader header = header_;
+  header.fortran = false;
+  header.shape.erase(header.shape.begin());
+  header.count = header_.count / header_.shape[0];
+  std::vector<char> bytes(header.bytes());
+  for (int64_t k = 0; k < header.count; ++k)
+    std::memcpy(bytes.data() + static_cast<size_t>(k) * header.width,
+                bytes_.data() + place(i * header.count + k), header.width);
+  return {header, std::move(bytes), where_};
+}
+
+bool NpyArray::is_shaped(const std::vector<int64_t>& wanted) const {
+  return !is_text() &&
+         std::equal(wanted.begin(), wanted.end(), shape().begin(), shape().end(),
+                    [](int64_t want, int64_t length) { return want < 0 || want == length; });
+}
+
+double NpyArray::operator[](int64_t i) const { return header_.number(bytes_.data() + place(i)); }
 
 std::vector<double> NpyArray::finite() const {
   std::vector<double> out(static_cast<size_t>(header_.count));

@@ -1,8 +1,8 @@
 // NPY arrays, versions 1.0 to 3.0: whole numbers, floating point (16, 32, 64 bits), truth values
 // and fixed-size text, in both byte orders and both layouts (C, Fortran).
 // Records of points (fields x, y, z and others of the same width) are arrays with one axis more.
-// InputError for anything else: pickled objects (never read: unpickling runs code), other records,
-// complex and extended numbers, a header that contradicts the number of bytes behind it.
+// InputError for anything else: pickled objects (pickle.h reads these), other records, complex and
+// extended numbers, a header that contradicts the number of bytes behind it.
 #pragma once
 
 #include <cstdint>
@@ -22,6 +22,7 @@ struct NpyHeader {
   bool big_endian = false, fortran = false;
   std::vector<int64_t> shape;  ///< slowest axis first; empty: one value
   int64_t count = 1;           ///< elements
+  bool is_object = false;      ///< a pickle stands in place of the elements (pickle.h); no type
   bool is_text() const { return kind == 'S' || kind == 'U'; }
   uint64_t bytes() const { return static_cast<uint64_t>(count) * width; }
   /// The number stored in these `width` bytes; NaN for text.
@@ -31,14 +32,27 @@ struct NpyHeader {
 };
 
 /// Reads the header; the stream then stands at the first element, and holds exactly the array's
-/// bytes from there on.
-NpyHeader read_npy_header(ByteStream& in);
+/// bytes from there on. Of an array of objects, InputError unless `objects`, then at the pickle.
+NpyHeader read_npy_header(ByteStream& in, bool objects = false);
+
+/// Of elements that are called so by numpy ("<f4", "i8", "S5"), in this shape. InputError about
+/// `where`: a type that is not read, an impossible shape.
+NpyHeader npy_header_of(const std::string& type, const std::vector<int64_t>& shape,
+                        const std::string& where);
 
 /// A whole array in memory, as it lies in the file; elements are converted when asked for.
 class NpyArray {
  public:
   /// InputError if the array takes more than `max_memory`.
   explicit NpyArray(ByteStream& in, uint64_t max_memory = kMaxMemory);
+  /// Of bytes in memory, as many as the header says.
+  NpyArray(NpyHeader header, std::vector<char> bytes, std::string where);
+
+  const NpyHeader& header() const { return header_; }
+  const std::vector<char>& bytes() const { return bytes_; }  ///< as they lie in the file
+  std::vector<char> in_order() const;                        ///< the same in C order
+  /// Part `i` of the first axis, without this axis, in C order.
+  NpyArray part(int64_t i) const;
 
   const std::vector<int64_t>& shape() const { return header_.shape; }
   int64_t size() const { return header_.count; }
@@ -55,6 +69,7 @@ class NpyArray {
   std::string text(int64_t i = 0) const;
 
  private:
+  size_t place(int64_t i) const;  ///< of element i of C order, in bytes_
   NpyHeader header_;
   std::vector<char> bytes_;
   std::string where_;

@@ -1,8 +1,6 @@
 #include "datasets/readers/arrays/npz.h"
 
 #include "autograd/base/error.h"
-#include "autograd/base/words.h"
-#include "datasets/readers/text/text.h"
 
 namespace restage {
 namespace {
@@ -37,11 +35,6 @@ NpyArray Npz::array(const std::string& name) const {
 NpyHeader Npz::header(const std::string& name) const {
   const std::unique_ptr<ByteStream> in = open(name);
   return read_npy_header(*in);
-}
-
-std::string list_of(const std::vector<std::string>& names) {
-  constexpr size_t kLong = 120;  // names may be anything, and a message is one line
-  return names.empty() ? "none" : cut_list(names, kLong, text::quote);
 }
 
 }  // namespace restage

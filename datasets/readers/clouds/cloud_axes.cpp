@@ -1,5 +1,6 @@
 #include "datasets/readers/clouds/cloud_axes.h"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -86,6 +87,39 @@ std::optional<CloudAxes> of_two(int64_t a, int64_t b, int64_t vertices) {
   return std::nullopt;
 }
 
+CloudAxes pictures(int64_t frames, int64_t height, int64_t width) {
+  const int64_t points = height * width;
+  return sequence(
+      frames, 3 * points,
+      cloud(points, 3, 1,
+            cat("taken for pictures of a depth camera, ", height, " x ", width, " points")));
+}
+
+/// Training data: windows of so many frames.
+CloudAxes windows(int64_t count, int64_t frames, int64_t points, int64_t columns) {
+  const std::string also = first_three(columns);
+  CloudAxes out = sequence(count * frames, columns * points,
+                           cloud(points, columns, 1,
+                                 cat("taken for ", count, " sequences of ", frames, " frames of ",
+                                     points, " points", also.empty() ? "" : ", " + also),
+                                 columns));
+  out.sequences = std::max<int64_t>(count, 1);
+  return out;
+}
+
+std::optional<CloudAxes> of_four(int64_t a, int64_t b, int64_t c, int64_t d) {
+  if (d == 3 && is_picture(b, c)) return pictures(a, b, c);
+  if (b == 3 && is_picture(c, d)) {
+    const int64_t pixels = c * d;
+    return sequence(a, 3 * pixels,
+                    cloud(pixels, 1, pixels,
+                          cat("taken for pictures of a depth camera, [frames, xyz, ", c, " x ", d,
+                              " points]")));
+  }
+  if (d == 3 || (are_columns(d) && c >= kFewestPoints)) return windows(a, b, c, d);
+  return std::nullopt;
+}
+
 std::optional<CloudAxes> of_three(int64_t a, int64_t b, int64_t c, int64_t vertices) {
   std::vector<CloudAxes> all;  // the likeliest first
   const auto either = [&](const CloudAxes& x, const CloudAxes& y) {
@@ -165,6 +199,7 @@ bool are_points(int64_t steps, const ReadSteps& read) {
   Points firsts;
   for (int64_t k = 0; k < kLookedAt; ++k) {
     const Points at = as_points(read(k * steps / kLookedAt, 1));
+    is_short = at.size() < kShort;
     Point least = at[0], most = at[0];
     for (const Point& p : at) {
       least = least.cwiseMin(p);
@@ -175,11 +210,47 @@ bool are_points(int64_t steps, const ReadSteps& read) {
     firsts.push_back(at[0]);
     moved = std::max(moved, (most - least).norm());
     paths += is_path(at, kAnyStep);
-    is_short = at.size() < kShort;
   }
   if (4 * paths >= 3 * kLookedAt) return true;
   return !is_path(firsts, kAnyStep) &&
          moved < (is_short ? kStaysShort : kStays) * (high - low).norm();
+}
+
+/// Whether `rows` rows of points are those of a depth camera's picture: neighbours lie side by
+/// side, and most rows are thin strips of the whole. (The frames of a sequence are people, each
+/// whole.)
+bool is_picture_by_numbers(const std::vector<double>& values, int64_t rows, int64_t columns) {
+  constexpr int64_t kLeastSide = 32, kMostAspect = 3;
+  constexpr float kThin = 0.15f, kNear = 0.1f;  // of the whole
+  if (std::min(rows, columns) < kLeastSide) return false;
+  if (std::max(rows, columns) > kMostAspect * std::min(rows, columns)) return false;
+  const Points points = as_points(values);
+  Eigen::AlignedBox3f all;
+  std::vector<Eigen::AlignedBox3f> boxes;
+  std::vector<float> steps;
+  for (int64_t r = 0; r < rows; ++r) {
+    Eigen::AlignedBox3f box;
+    const Point* before = nullptr;
+    for (int64_t c = 0; c < columns; ++c) {
+      const Point& p = points[static_cast<size_t>(r * columns + c)];
+      if (!p.allFinite() || p.isZero(0)) {  // the camera saw nothing there
+        before = nullptr;
+        continue;
+      }
+      box.extend(p);
+      if (before != nullptr) steps.push_back((p - *before).norm());
+      before = &p;
+    }
+    if (box.isEmpty()) continue;
+    all.extend(box);
+    boxes.push_back(box);
+  }
+  if (boxes.empty() || steps.empty()) return false;
+  const auto thin = std::count_if(boxes.begin(), boxes.end(), [&](const Eigen::AlignedBox3f& box) {
+    return (box.sizes().array() / all.sizes().array().max(1e-9f)).minCoeff() < kThin;
+  });
+  std::nth_element(steps.begin(), steps.begin() + std::ssize(steps) / 2, steps.end());
+  return 2 * thin > std::ssize(boxes) && steps[steps.size() / 2] < kNear * all.diagonal().norm();
 }
 
 }  // namespace
@@ -187,6 +258,11 @@ bool are_points(int64_t steps, const ReadSteps& read) {
 CloudAxes axes_by_numbers(CloudAxes axes, const std::vector<int64_t>& shape, const ReadSteps& read,
                           int64_t vertices) {
   if (axes.points == 0 || axes.frames == 0) return axes;
+  if (axes.sequences > 1 && axes.columns == 3) {
+    const int64_t rows = axes.frames / axes.sequences;
+    if (is_picture_by_numbers(read(0, 1), rows, axes.points))
+      return pictures(axes.sequences, rows, axes.points);
+  }
   if (axes.columns > 3 && are_numbered(axes, read)) {
     axes.skipped = 1;
     axes.remark = cat("the first of its ", axes.columns,
@@ -238,19 +314,8 @@ std::optional<CloudAxes> cloud_axes(const std::vector<int64_t>& shape, int64_t v
     at = *at == 1 ? axes.erase(at) : at + 1;
   if (axes.size() == 2) return of_two(axes[0], axes[1], vertices);
   if (axes.size() == 3) return of_three(axes[0], axes[1], axes[2], vertices);
-  if (axes.size() == 4 && axes[1] == 3 && is_picture(axes[2], axes[3])) {
-    const int64_t pixels = axes[2] * axes[3];
-    return sequence(axes[0], 3 * pixels,
-                    cloud(pixels, 1, pixels,
-                          cat("taken for pictures of a depth camera, [frames, xyz, ", axes[2],
-                              " x ", axes[3], " points]")));
-  }
-  if (axes.size() != 4 || axes[3] != 3) return std::nullopt;
-  const int64_t points = axes[1] * axes[2];
-  return sequence(
-      axes[0], 3 * points,
-      cloud(points, 3, 1,
-            cat("taken for pictures of a depth camera, ", axes[1], " x ", axes[2], " points")));
+  if (axes.size() == 4) return of_four(axes[0], axes[1], axes[2], axes[3]);
+  return std::nullopt;
 }
 
 }  // namespace restage

@@ -2,8 +2,10 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <optional>
 #include <string>
+#include <vector>
 
 namespace restage {
 
@@ -16,5 +18,8 @@ std::optional<size_t> cloud_rank(const std::string& name);
 /// com) and what instruments measured (gyro), unless the name also speaks of points
 /// (camera_points) or is numbered as a frame is (pose_0001).
 bool is_no_cloud(const std::string& name, bool one_frame);
+
+/// Whether an array of this name and shape holds depth pictures, [H, W] or [F, H, W].
+bool are_depth_pictures(const std::string& name, const std::vector<int64_t>& shape);
 
 }  // namespace restage

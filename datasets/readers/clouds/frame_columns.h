@@ -1,6 +1,8 @@
-// Columns of tables of points that tell which frame a point is of.
+// Columns of tables of points that tell which frame a point is of, or only number the points.
 #pragma once
 
+#include <array>
+#include <cmath>
 #include <cstdint>
 #include <optional>
 #include <string_view>
@@ -36,6 +38,33 @@ class FrameColumns {
 
   std::vector<Column> columns_;
   int64_t rows_ = 0;
+};
+
+/// Whether the first of nameless columns numbers the points, as COLMAP's and others' tables do.
+class IdColumn {
+ public:
+  explicit IdColumn(bool may_be = false) : by_one_(may_be), rises_(may_be) {}
+  bool may_be() const { return rises_; }
+  /// Each is one more than the one before.
+  bool by_one() const { return by_one_; }
+  /// Whole numbers that rise from row to row, while the three behind them have decimals.
+  bool are_ids() const { return rises_ && rows_ > 3 && 2 * decimals_ > rows_; }
+  void refuse() { by_one_ = rises_ = false; }
+  /// The first four numbers of a row.
+  void add(const std::array<double, 4>& row) {
+    const auto whole = [](double value) { return value == std::floor(value); };
+    const bool first = rows_ == 0;
+    rises_ = rises_ && whole(row[0]) && (first || row[0] > last_);
+    by_one_ = by_one_ && whole(row[0]) && (first || row[0] == last_ + 1);
+    decimals_ += !whole(row[1]) && !whole(row[2]) && !whole(row[3]);
+    last_ = row[0];
+    ++rows_;
+  }
+
+ private:
+  bool by_one_, rises_;
+  int64_t rows_ = 0, decimals_ = 0;
+  double last_ = 0;
 };
 
 }  // namespace restage

@@ -43,9 +43,9 @@ void require_points(const Mesh& mesh, const std::string& path) {
 }
 
 Mesh without_non_finite(const std::string& content, const std::string& path, const Vec3& origin,
-                        size_t& left_out) {
-  Mesh mesh = parse_mesh(content, path, origin, NonFinite::mark);
-  left_out = leave_out_non_finite(mesh.vertices, mesh.faces);
+                        LeftOut& left_out) {
+  Mesh mesh = parse_mesh(content, path, origin, NonFinite::mark, &left_out.faint);
+  left_out.non_finite = leave_out_non_finite(mesh.vertices, mesh.faces);
   return mesh;
 }
 
@@ -55,8 +55,6 @@ void require_some(const Mesh& mesh, size_t left_out, const std::string& path) {
   if (mesh.vertices.empty())
     throw InputError(path, "holds no points but NaN and infinite ones", "export it again");
 }
-
-constexpr const char* kDoctorMoves = "restage doctor FILE --fix OUT moves it to the origin";
 
 }  // namespace
 
@@ -68,10 +66,16 @@ bool is_cloud_name(const std::string& path) {
   return text::ends_in(path, {".pcd", ".xyz", ".xyzn", ".xyzrgb", ".pts", ".asc"});
 }
 
-bool is_text_name(const std::string& path) { return text::ends_in(path, {".txt", ".csv"}); }
+bool may_be_cloud_name(const std::string& path) {
+  return text::ends_in(path, {".txt", ".csv", ".bin"});
+}
 
-bool is_table_of_points(const std::string& path) {
+bool is_cloud_by_content(const std::string& path) {
   FileStream file(path);
+  if (text::ends_in(path, {".bin"})) {
+    const std::vector<char> head = file.take(std::min<uint64_t>(file.size(), kRawHead));
+    return raw_columns({head.data(), head.size()}, file.size()) > 0;
+  }
   const std::vector<char> head = file.take(std::min<uint64_t>(file.size(), 5000));
   return starts_as_table({head.data(), head.size()});
 }
@@ -87,32 +91,41 @@ Mesh read_frame_mesh(const std::string& path, size_t& left_out) {
   left_out = 0;
   const std::string content = read_file(path);
   if (content.empty()) return {};  // a recorder that saw nothing
-  Mesh mesh = without_non_finite(content, path, Vec3::Zero(), left_out);
+  Mesh mesh = parse_mesh(content, path, Vec3::Zero(), NonFinite::mark);
+  left_out = leave_out_non_finite(mesh.vertices, mesh.faces);
   check_precision(mesh.vertices, path, kDoctorMoves);
   return mesh;
 }
 
-Mesh read_mesh(const std::string& path, size_t& left_out, Vec3& origin) {
+Mesh read_frame_mesh(const std::string& path, LeftOut& left_out, const Vec3& origin) {
+  left_out = {};
+  const std::string content = read_file(path);
+  return content.empty() ? Mesh() : without_non_finite(content, path, origin, left_out);
+}
+
+Mesh read_mesh(const std::string& path, LeftOut& left_out, Vec3& origin) {
   const std::string content = read_file(path);
   origin.setZero();
   Mesh mesh = without_non_finite(content, path, origin, left_out);
-  require_some(mesh, left_out, path);
+  require_some(mesh, left_out.non_finite, path);
   if (is_gltf_name(path) || !is_blurred(mesh.vertices)) return mesh;  // glTF is single precision
   origin = mesh.vertices[0].cast<double>();
   return without_non_finite(content, path, origin, left_out);
 }
 
 Mesh parse_mesh(const std::string& content, const std::string& path, const Vec3& origin,
-                NonFinite how) {
+                NonFinite how, size_t* faint) {
   refuse_foreign_content(content, path);
   Mesh mesh;
-  if (content.empty() && !is_cloud_name(path) && !is_text_name(path)) {
+  if (content.empty() && !is_cloud_name(path) && !may_be_cloud_name(path)) {
     throw InputError(path, "is empty and holds no points", "give a mesh or cloud that has some");
   } else if (is_gltf_name(path) || content.compare(0, 4, "glTF") == 0) {
     const Gltf file = parse_gltf(content, path);
-    return gltf_mesh(file, gltf_rest(file));
+    mesh = gltf_mesh(file, gltf_rest(file));
+    for (Point& p : mesh.vertices) p -= origin.cast<float>();
+    return mesh;
   } else if (starts_as_ply(content)) {
-    mesh = parse_ply(content, path, origin, how);
+    mesh = parse_ply(content, path, origin, how, nullptr, faint);
   } else if (text::ends_in(path, {".ply"})) {
     throw InputError(path, "is not a PLY file (it does not begin with 'ply')",
                      "export the file again");
@@ -120,7 +133,9 @@ Mesh parse_mesh(const std::string& content, const std::string& path, const Vec3&
     mesh = parse_obj(content, path, origin, how);
   } else if (text::ends_in(path, {".pcd"}) || starts_as_pcd(content)) {
     mesh = parse_pcd(content, path, origin, how);
-  } else if (is_cloud_name(path) || is_text_name(path)) {
+  } else if (text::ends_in(path, {".bin"})) {
+    mesh = parse_raw(content, path, origin, how);
+  } else if (is_cloud_name(path) || may_be_cloud_name(path)) {
     mesh = parse_table(content, path, origin, how);
   } else {
     refuse_foreign_kind(path);

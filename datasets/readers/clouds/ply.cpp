@@ -218,8 +218,116 @@ int colour_channel(const Property& p) {
   return p.count || at == kNames.end() ? -1 : static_cast<int>(at - kNames.begin());
 }
 
+// ---- splats ------------------------------------------------------------------------------------
+
+size_t property_named(const Element& element, std::string_view name) {
+  for (size_t k = 0; k < element.properties.size(); ++k)
+    if (element.properties[k].name == name && !element.properties[k].count) return k;
+  return std::string::npos;
+}
+
+constexpr double kFaint = 0.1;  // an opacity below it nobody sees
+
+/// Which of the splats nobody sees, one by one.
+struct Faint {
+  std::vector<bool> is;
+
+  /// Leaves them out, unless they are nearly all; gives how many.
+  size_t leave_out(Points& points) const {
+    constexpr size_t kFewestSeen = 64;
+    if (is.size() != points.size()) return 0;
+    const auto faint = static_cast<size_t>(std::count(is.begin(), is.end(), true));
+    if (points.size() - faint < kFewestSeen) return 0;
+    size_t kept = 0;
+    for (size_t i = 0; i < points.size(); ++i)
+      if (!is[i]) points[kept++] = points[i];
+    points.resize(kept);
+    return faint;
+  }
+};
+
+/// SuperSplat's: the box of the positions of so many splats.
+struct Chunk {
+  static constexpr uint64_t kSplats = 256;
+  Vec3 low, high;
+};
+
+bool is_packed(const Element& element) {
+  return property_named(element, "packed_position") != std::string::npos;
+}
+
+std::vector<Chunk> read_chunks(Rows& rows, const Element& element, const std::string& path) {
+  std::array<size_t, 6> at{};
+  const std::array<std::string_view, 6> names = {"min_x", "min_y", "min_z",
+                                                 "max_x", "max_y", "max_z"};
+  for (size_t k = 0; k < 6; ++k) {
+    at[k] = property_named(element, names[k]);
+    if (at[k] == std::string::npos)
+      throw InputError(path, cat("its chunks do not have the property ", names[k]), kExportAgain);
+  }
+  std::vector<Chunk> out;
+  std::vector<double> row(element.properties.size());
+  for (uint64_t i = 0; i < element.count; ++i) {
+    rows.begin_row();
+    for (size_t k = 0; k < row.size(); ++k) {
+      if (element.properties[k].count)
+        skip_property(rows, element.properties[k]);
+      else
+        row[k] = rows.next(*element.properties[k].type);
+    }
+    rows.end_row();
+    out.push_back({{row[at[0]], row[at[1]], row[at[2]]}, {row[at[3]], row[at[4]], row[at[5]]}});
+  }
+  return out;
+}
+
+/// Positions of 11, 10 and 11 bits in the box of their chunk; the lowest byte of the colour is the
+/// opacity.
+void read_packed(Rows& rows, const Element& element, const std::vector<Chunk>& chunks,
+                 const std::string& path, const Vec3& origin, NonFinite how, Points& points,
+                 Faint& faint) {
+  const size_t position = property_named(element, "packed_position");
+  const size_t colour = property_named(element, "packed_color");
+  if (element.count > Chunk::kSplats * chunks.size())
+    throw InputError(path, "has fewer chunks than its packed splats need", kExportAgain);
+  for (uint64_t i = 0; i < element.count; ++i) {
+    rows.begin_row();
+    uint32_t place = 0, rgba = 0xFF;
+    for (size_t k = 0; k < element.properties.size(); ++k) {
+      const Property& property = element.properties[k];
+      if (k != position && k != colour) {
+        skip_property(rows, property);
+        continue;
+      }
+      const double value = rows.next(*property.type);
+      if (!(value >= 0 && value < 4294967296.0) || value != std::floor(value))
+        throw InputError(rows.where(), "a packed number is out of range", kExportAgain);
+      (k == position ? place : rgba) = static_cast<uint32_t>(value);
+    }
+    rows.end_row();
+    const Vec3 share((place >> 21) / 2047.0, ((place >> 11) & 1023) / 1023.0,
+                     (place & 2047) / 2047.0);
+    const Chunk& chunk = chunks[i / Chunk::kSplats];
+    const Vec3 at = chunk.low + share.cwiseProduct(chunk.high - chunk.low) - origin;
+    Point point;
+    for (int axis = 0; axis < 3; ++axis)
+      point[axis] = text::coordinate(
+          at[axis], [&] { return rows.where(); }, how);
+    points.push_back(point);
+    faint.is.push_back((rgba & 255) / 255.0 < kFaint);
+  }
+}
+
+/// Where the opacity of splats stands, a number before the sigmoid; npos: these are none.
+size_t opacity_of(const Element& element) {
+  for (const std::string_view mark : {"f_dc_0", "scale_0", "rot_0"})
+    if (property_named(element, mark) != std::string::npos)
+      return property_named(element, "opacity");
+  return std::string::npos;
+}
+
 void read_vertices(Rows& rows, const Element& element, const std::string& path, const Vec3& origin,
-                   NonFinite how, Points& points, Colours* colours) {
+                   NonFinite how, Points& points, Colours* colours, Faint& faint) {
   std::array<int, 3> axis_seen = {0, 0, 0};
   std::vector<int> axis_of;  // for each property: 0, 1, 2 or -1
   for (const Property& p : element.properties) {
@@ -235,6 +343,7 @@ void read_vertices(Rows& rows, const Element& element, const std::string& path, 
     channel_of.push_back(colours == nullptr ? -1 : colour_channel(p));
     if (channel_of.back() >= 0 && channel_of.back() < 3) coloured |= 1 << channel_of.back();
   }
+  const size_t opacity = opacity_of(element);
   points.reserve(points.size() + element.count);
   for (uint64_t i = 0; i < element.count; ++i) {
     rows.begin_row();
@@ -246,7 +355,9 @@ void read_vertices(Rows& rows, const Element& element, const std::string& path, 
         const double whole = !property.type->integer ? 1 : property.type->bytes == 1 ? 255 : 65535;
         colour[static_cast<size_t>(channel_of[k])] =
             static_cast<float>(std::clamp(rows.next(*property.type) / whole, 0.0, 1.0));
-      } else if (axis_of[k] < 0)
+      } else if (k == opacity)
+        faint.is.push_back(1 / (1 + std::exp(-rows.next(*property.type))) < kFaint);
+      else if (axis_of[k] < 0)
         skip_property(rows, property);
       else
         point[axis_of[k]] = text::coordinate(
@@ -284,18 +395,57 @@ void read_faces(Rows& rows, const Element& element, std::vector<Triangle>& faces
   }
 }
 
+/// Strips of triangles, each begun anew behind -1; every second triangle of a strip is turned over.
+void read_strips(Rows& rows, const Element& element, std::vector<Triangle>& faces) {
+  for (uint64_t i = 0; i < element.count; ++i) {
+    rows.begin_row();
+    for (const Property& p : element.properties) {
+      if (!p.count || (p.name != "vertex_indices" && p.name != "vertex_index")) {
+        skip_property(rows, p);
+        continue;
+      }
+      const size_t n = rows.next_length(p);
+      size_t length = 0;  // of the strip so far
+      Triangle last{};    // its last three corners
+      for (size_t k = 0; k < n; ++k) {
+        const double index = rows.next(*p.type);
+        if (!(index >= -1 && index < 2147483648.0) || index != std::floor(index))
+          throw InputError(rows.where(), "an index of a strip is out of range", kExportAgain);
+        length = index < 0 ? 0 : length + 1;
+        if (index < 0) continue;
+        last = {last[1], last[2], static_cast<int32_t>(index)};
+        const bool flat = last[0] == last[1] || last[1] == last[2] || last[0] == last[2];
+        if (length < 3 || flat) continue;
+        faces.push_back(length % 2 == 1 ? last : Triangle{last[1], last[0], last[2]});
+      }
+    }
+    rows.end_row();
+  }
+}
+
 }  // namespace
 
 Mesh parse_ply(std::string_view content, const std::string& path, const Vec3& origin, NonFinite how,
-               Colours* colours) {
+               Colours* colours, size_t* faint) {
   text::Lines lines(content);
   const PlyHeader header = parse_header(lines, path);
   Rows rows(lines, header, path);
   Mesh mesh;
+  Faint unseen;
+  std::vector<Chunk> chunks;
+  const bool packed =
+      std::any_of(header.elements.begin(), header.elements.end(),
+                  [](const Element& e) { return e.name == "vertex" && is_packed(e); });
   for (const Element& element : header.elements) {
     rows.begin(element);
-    if (element.name == "vertex") {
-      read_vertices(rows, element, path, origin, how, mesh.vertices, colours);
+    if (element.name == "chunk" && packed) {
+      chunks = read_chunks(rows, element, path);
+    } else if (element.name == "vertex" && packed) {
+      read_packed(rows, element, chunks, path, origin, how, mesh.vertices, unseen);
+    } else if (element.name == "vertex") {
+      read_vertices(rows, element, path, origin, how, mesh.vertices, colours, unseen);
+    } else if (element.name == "tristrips") {
+      read_strips(rows, element, mesh.faces);
     } else if (element.name == "face") {
       read_faces(rows, element, mesh.faces);
     } else {
@@ -306,6 +456,7 @@ Mesh parse_ply(std::string_view content, const std::string& path, const Vec3& or
       }
     }
   }
+  if (faint != nullptr) *faint = mesh.faces.empty() ? unseen.leave_out(mesh.vertices) : 0;
   return mesh;
 }
 

@@ -7,6 +7,7 @@
 #include "autograd/base/format.h"
 #include "datasets/readers/clouds/frame_columns.h"
 #include "datasets/readers/clouds/mesh_parsers.h"
+#include "datasets/readers/clouds/table_frames.h"
 #include "datasets/readers/errors.h"
 #include "datasets/readers/text/text.h"
 #include "datasets/readers/text/word_lines.h"
@@ -21,6 +22,7 @@ const char* const kPartOtherwise =
     "by semicolons)";
 const char* const kFileEach = "write each frame into a file of its own";
 constexpr size_t kMaxColumns = 4096;
+constexpr size_t kHead = 4096;  // bytes that tell what a table is
 
 using Cells = std::vector<std::string_view>;
 
@@ -68,7 +70,8 @@ char separator_of(std::string_view line) {
   return line.find(',') != std::string_view::npos && !decimals ? ',' : ' ';
 }
 
-/// "X", "x [m]", "Points:0", "pos_y", "//Z" and their like; -1: another column.
+/// "X", "x [m]", "pos_y", "//Z" and their like: 0 to 2; "Points:0" and its like: 3 to 5; -1:
+/// another column.
 int axis_of(std::string_view cell) {
   std::string name = lower_case(cell);
   name = name.substr(0, name.find_first_of("[("));
@@ -79,10 +82,25 @@ int axis_of(std::string_view cell) {
   for (int axis = 0; axis < 3; ++axis) {
     for (const std::string_view before : kBefore)
       if (name == std::string(before) + "xyz"[axis]) return axis;
-    for (const std::string_view before : {"points:", "points_"})
-      if (name == std::string(before) + "012"[axis]) return axis;
+    for (const std::string_view before : {"points:", "points_", "points_m_xyz:"})
+      if (name == std::string(before) + "012"[axis]) return 3 + axis;
   }
   return -1;
+}
+
+/// The columns of x, y and z; of both ways to call them (VeloView's have both) x, y and z. {-1, -1,
+/// -1}: each does not stand there once.
+std::array<int, 3> axis_columns(const Cells& names) {
+  std::array<int, 6> columns{-1, -1, -1, -1, -1, -1}, seen{};
+  for (size_t i = 0; i < names.size(); ++i)
+    if (const int axis = axis_of(names[i]); axis >= 0) {
+      columns[static_cast<size_t>(axis)] = static_cast<int>(i);
+      ++seen[static_cast<size_t>(axis)];
+    }
+  for (const size_t from : {0, 3})
+    if (seen[from] == 1 && seen[from + 1] == 1 && seen[from + 2] == 1)
+      return {columns[from], columns[from + 1], columns[from + 2]};
+  return {-1, -1, -1};
 }
 
 /// What programs write for a number that is missing. "Na" is sodium.
@@ -99,11 +117,16 @@ bool is_value(std::string_view cell) {
   return is_missing(cell) || text::parse(cell, value) || text::has_decimal_comma(cell);
 }
 
+bool is_frame_name(std::string_view cell) {
+  const std::string name = lower_case(cell);
+  return name.starts_with("frame") || name.ends_with("frame") || name == "f";
+}
+
 /// "frame", "Frame #", "frame_id"; or a time, which frames share, too.
 bool counts_frames(std::string_view cell) {
   const std::string name = lower_case(cell);
-  return name.starts_with("frame") || name.ends_with("frame") || name.starts_with("time") ||
-         name == "t" || name == "t [s]" || name == "f";
+  return is_frame_name(cell) || (name.starts_with("time") && !name.ends_with("type")) ||
+         name == "t" || name == "t [s]";
 }
 
 /// Whether each number stands in two cells, as "0,512,1,204,0,031" does where commas both part the
@@ -127,6 +150,11 @@ class TableParser {
  public:
   TableParser(std::string_view content, const std::string& path, const Vec3& origin, NonFinite how)
       : lines_(text::without_mark(content, path)), path_(path), origin_(origin), how_(how) {}
+
+  /// From now on the column that numbers frames goes there, and several are no error.
+  void split_by(TableSplitter& splitter) { split_ = &splitter; }
+  /// Of the column that numbers frames; empty: there is none.
+  const std::string& frame_name() const { return frame_name_; }
 
   /// `whole`: not only the first lines of a file.
   Mesh parse(bool whole) {
@@ -193,10 +221,7 @@ class TableParser {
     while (!line.empty() && (line[0] == '#' || line[0] == '/')) line.remove_prefix(1);
     Cells cells;
     split(line, separator_of(line), cells);
-    std::array<int, 3> seen{};
-    for (const std::string_view cell : cells)
-      if (const int axis = axis_of(cell); axis >= 0) ++seen[static_cast<size_t>(axis)];
-    return seen == std::array<int, 3>{1, 1, 1};
+    return axis_columns(cells)[0] >= 0;
   }
 
   void first_line(std::string_view line) {
@@ -207,6 +232,7 @@ class TableParser {
     drop_empty_end();
     if (axis_column_[0] < 0) axis_column_ = first_axes();
     columns_ = std::max(cells_.size(), named_columns_);
+    counts_ = IdColumn(named_columns_ == 0 && columns_ > 3 && axis_column_[0] == 0);
     point(line);
   }
 
@@ -231,12 +257,21 @@ class TableParser {
     while (!line.empty() && (line[0] == '#' || line[0] == '/')) line.remove_prefix(1);
     split(line, separator_of(line), cells_);
     drop_empty_end();
+    axis_column_ = axis_columns(cells_);
     for (size_t i = 0; i < cells_.size(); ++i) {
-      if (const int axis = axis_of(cells_[i]); axis >= 0)
-        axis_column_[static_cast<size_t>(axis)] = static_cast<int>(i);
-      if (counts_frames(cells_[i])) frame_column_ = static_cast<int>(i);
+      if (counts_frames(cells_[i]) && tells_better(cells_[i])) {
+        frame_column_ = static_cast<int>(i);
+        frame_name_ = cells_[i];
+      }
+      // COLMAP's tracks: "TRACK[] as (IMAGE_ID, POINT2D_IDX)" stands for any number of columns.
+      any_length_ = any_length_ || cells_[i].find("[]") != std::string_view::npos;
     }
-    named_columns_ = cells_.size();
+    named_columns_ = any_length_ ? 0 : cells_.size();
+  }
+
+  /// Of several columns that may number frames the last that is called so, else the last time.
+  bool tells_better(std::string_view name) const {
+    return frame_column_ < 0 || is_frame_name(name) || !is_frame_name(frame_name_);
   }
 
   void point(std::string_view line) {
@@ -246,12 +281,16 @@ class TableParser {
     if (out_.vertices.empty()) first_row_ = lines_.number();
     if (cells_.size() != columns_ && out_.vertices.size() == 1 && is_behind_count(first_row_)) {
       out_.vertices.clear();  // three numbers, and yet the remark
+      behind_.clear();
       has_remark_ = true;
       axis_column_[0] = -1;
       columns_ = 0;
       return first_line(line);
     }
-    if (cells_.size() != columns_)
+    const bool long_enough =
+        any_length_ && std::all_of(axis_column_.begin(), axis_column_.end(),
+                                   [&](int column) { return column < std::ssize(cells_); });
+    if (cells_.size() != columns_ && !long_enough)
       throw InputError(where(), cat("has ", cells_.size(), " columns, the lines before ", columns_),
                        separator_ == ',' ? kPartOtherwise : kSaveAgain);
     const bool twice = named_columns_ > 0 && cells_.size() == 2 * named_columns_;
@@ -264,10 +303,9 @@ class TableParser {
       point[static_cast<int>(axis)] = text::coordinate(
           value - origin_[static_cast<int>(axis)], [&] { return where(); }, how_);
     }
-    counted_ = counted_ && named_columns_ == 0 && columns_ > 3 && axis_column_[0] == 0 &&
-               follows(number(cells_[0]));
+    if (counts_.may_be()) count(cells_);
     if (frame_column_ >= 0) check_frame(cells_[static_cast<size_t>(frame_column_)]);
-    if (named_columns_ == 0 && columns_ > 3) frames_.add(cells_);
+    if (named_columns_ == 0 && !any_length_ && columns_ > 3) frames_.add(cells_);
     if (repeats_frames_) frames_.add({cells_[*repeats_frames_]});
     out_.vertices.push_back(point);
   }
@@ -295,22 +333,38 @@ class TableParser {
     return value;
   }
 
-  /// Whether the first column counts on from the line before.
-  bool follows(double value) {
-    const bool out = out_.vertices.empty() ? value == std::floor(value) : value == last_ + 1;
-    last_ = value;
-    return out;
+  /// Looks whether the first column holds numbers of points.
+  void count(const Cells& cells) {
+    if (!std::all_of(cells.begin(), cells.begin() + 4, is_value)) return counts_.refuse();
+    std::array<double, 4> values{};
+    for (size_t i = 0; i < 4; ++i) values[i] = number(cells[i]);
+    counts_.add(values);
+    Point point;
+    for (int axis = 0; axis < 3; ++axis)
+      point[axis] = text::coordinate(
+          values[static_cast<size_t>(axis) + 1] - origin_[axis], [&] { return where(); }, how_);
+    behind_.push_back(point);
   }
 
   void check_frame(std::string_view cell) {
+    if (split_ != nullptr) return split_->add(cell);
+    times_.add(cell);
     if (out_.vertices.empty()) frame_ = cell;
-    if (cell == frame_) return;
-    if (out_.vertices.size() > 1)
-      throw InputError(where(), "another frame begins here, and a table is one frame", kFileEach);
+    if (cell == frame_ || changed_at_ > 0) return;
+    if (out_.vertices.size() > 1) {
+      changed_at_ = lines_.number();
+      if (is_frame_name(frame_name_)) refuse_another_frame();
+      return;  // a sensor may have turned once in these times
+    }
     // It counts points, is a scanner's time of each, or goes through all frames of a point.
     repeats_frames_ = static_cast<size_t>(frame_column_);
     frame_column_ = -1;
     frames_.add({frame_});
+  }
+
+  [[noreturn]] void refuse_another_frame() const {
+    throw InputError(cat(path_, ":", changed_at_),
+                     "another frame begins here, and a table is one frame", kFileEach);
   }
 
   /// InputError if a column tells the frames of the points, where no first line says what it is.
@@ -338,10 +392,13 @@ class TableParser {
       throw InputError(
           path_, cat("holds ", out_.vertices.size(), " points, its first line says ", *announced_),
           "give the whole file");
-    if (counted_ && out_.vertices.size() > 3)
+    const bool ids = counts_.are_ids() && behind_.size() == out_.vertices.size();
+    if (counts_.by_one() && !ids && out_.vertices.size() > 3)
       throw InputError(path_, "its first column only counts the points",
                        "leave that column out, or name the columns in a first line (n x y z)");
+    if (changed_at_ > 0 && !times_.is_one_turn(frame_name_)) refuse_another_frame();
     check_no_frames();
+    if (ids) out_.vertices = std::move(behind_);
   }
 
   text::Lines lines_;
@@ -354,27 +411,62 @@ class TableParser {
   size_t columns_ = 0, named_columns_ = 0;
   std::array<int, 3> axis_column_ = {-1, -1, -1};
   int frame_column_ = -1;
-  std::string frame_;
+  std::string frame_, frame_name_;
+  TableSplitter* split_ = nullptr;
+  TableSplitter times_;     // of the column that may number frames
+  int64_t changed_at_ = 0;  // the line where that first changed
   FrameColumns frames_;
   std::optional<size_t> repeats_frames_;    // a column named so whose value changes at once
   std::optional<int64_t> announced_;        // points
   int64_t count_line_ = 0, first_row_ = 0;  // lines: where that stands, and the first point
   bool has_remark_ = false;                 // is_remark()
-  bool counted_ = true;
-  double last_ = 0;
+  bool any_length_ = false;                 // of the rows, by the first line
+  IdColumn counts_;                         // the first of nameless columns
+  Points behind_;                           // by the three columns behind it
 };
+
+/// Its first lines, each of them whole.
+std::string head_of(std::string_view content) {
+  std::string out(content.substr(0, kHead));
+  if (content.size() > out.size()) out.resize(out.rfind('\n') + 1);  // npos + 1 is 0
+  return out;
+}
 
 }  // namespace
 
 bool starts_as_table(std::string_view content) {
-  std::string head(content.substr(0, 4096));
-  if (content.size() > head.size()) head.resize(head.rfind('\n') + 1);  // npos + 1 is 0
+  const std::string head = head_of(content);
   try {
     const std::string nowhere;
     return !TableParser(head, nowhere, Vec3::Zero(), NonFinite::mark).parse(false).vertices.empty();
   } catch (const InputError&) {
     return false;
   }
+}
+
+bool names_frames(std::string_view content) {
+  try {
+    TableSplitter any;
+    const std::string head = head_of(content), nowhere;
+    TableParser parser(head, nowhere, Vec3::Zero(), NonFinite::mark);
+    parser.split_by(any);
+    parser.parse(false);
+    return !parser.frame_name().empty();
+  } catch (const InputError&) {
+    return false;
+  }
+}
+
+std::optional<TableFrames> parse_table_frames(std::string_view content, const std::string& path,
+                                              const Vec3& origin) {
+  TableSplitter splitter;
+  TableParser parser(content, path, origin, NonFinite::mark);
+  parser.split_by(splitter);
+  Mesh mesh = parser.parse(true);
+  std::optional<TableFrames> out =
+      splitter.frames(parser.frame_name(), is_frame_name(parser.frame_name()));
+  if (out) out->points = std::move(mesh.vertices);
+  return out;
 }
 
 Mesh parse_table(std::string_view content, const std::string& path, const Vec3& origin,

@@ -14,7 +14,11 @@ bool is_blurred(const Points& points);
 double rounding_step(const Points& points);
 /// InputError if they are blurred; `fix` says what to do.
 void check_precision(const Points& points, const std::string& where, const std::string& fix);
-/// The advice where the doctor cannot help.
-inline constexpr const char* kSubtract = "subtract an offset from all coordinates first";
+/// The advice for numbers of double precision and texts.
+inline constexpr const char* kDoctorMoves =
+    "restage doctor SOURCE --fix OUT moves it to the origin";
+/// The advice where they are stored so: what single precision has rounded the doctor cannot mend.
+inline constexpr const char* kSubtract =
+    "subtract an offset from all coordinates before they are saved in single precision";
 
 }  // namespace restage

@@ -7,6 +7,8 @@
 #include "datasets/readers/clouds/cloud_names.h"
 #include "datasets/readers/clouds/precision.h"
 #include "datasets/readers/errors.h"
+#include "datasets/readers/frames/hdf5_frames.h"
+#include "datasets/readers/frames/padding.h"
 #include "datasets/readers/frames/ragged_frames.h"
 #include "datasets/readers/text/text.h"
 #include "datasets/readers/text/word_lines.h"
@@ -105,8 +107,8 @@ std::vector<CloudArray> unnamed_clouds(const Npz& file) {
       const std::optional<NpyHeader> header = header_if_readable(file, name);
       if (!header) continue;
       const std::optional<CloudAxes> axes = axes_of(*header, vertices_beside(file, *header));
-      if (axes && !is_no_cloud(name, !axes->sequence) && (header->kind != 'f') == whole_numbers &&
-          header->kind != 'b')
+      if (axes && !are_depth_pictures(name, header->shape) && !is_no_cloud(name, !axes->sequence) &&
+          (header->kind != 'f') == whole_numbers && header->kind != 'b')
         out.push_back({name, *axes, {}});
     }
     if (!out.empty()) break;
@@ -114,22 +116,27 @@ std::vector<CloudArray> unnamed_clouds(const Npz& file) {
   return out;
 }
 
+/// The arrays of numbers beside one; with those of truth values, if `masks`.
+std::vector<BesideArray> beside(const Npz& file, const std::string& cloud, bool masks) {
+  std::vector<BesideArray> out;
+  for (const std::string& name : file.names()) {
+    const std::optional<NpyHeader> header = header_if_readable(file, name);
+    if (name == cloud || !header || header->is_text() || (header->kind == 'b' && !masks)) continue;
+    const auto read = [&file, name] {
+      const NpyArray array = file.array(name);
+      std::vector<double> numbers;
+      for (int64_t i = 0; i < array.size(); ++i) numbers.push_back(array[i]);
+      return numbers;
+    };
+    out.push_back({name, header->shape, header->kind != 'f', read});
+  }
+  return out;
+}
+
 /// The cloud as a sequence, if arrays beside it part it into frames.
 CloudArray with_frames(const Npz& file, CloudArray cloud) {
   if (cloud.axes.sequence) return cloud;
-  std::vector<BesideArray> beside;
-  for (const std::string& name : file.names()) {
-    const std::optional<NpyHeader> header = header_if_readable(file, name);
-    if (name == cloud.name || !header || header->is_text() || header->kind == 'b') continue;
-    const auto read = [&file, name] {
-      const NpyArray array = file.array(name);
-      std::vector<double> out;
-      for (int64_t i = 0; i < array.size(); ++i) out.push_back(array[i]);
-      return out;
-    };
-    beside.push_back({name, header->shape, header->kind != 'f', read});
-  }
-  auto frames = ragged_frames(file.path(), cloud.axes.points, beside);
+  auto frames = ragged_frames(file.path(), cloud.axes.points, beside(file, cloud.name, false));
   if (!frames) return cloud;
   cloud.axes.sequence = true;
   cloud.axes.frames = std::ssize(frames->offset) - 1;
@@ -148,14 +155,17 @@ std::vector<std::string> names_of(const std::vector<CloudArray>& clouds) {
 
 class ArrayFrames : public FrameSource {
  public:
-  /// `parts`: what parts one cloud into frames; empty: nothing does.
-  ArrayFrames(const std::string& path, OpenArray array, double fps, uint64_t max_memory,
-              const CloudArray& parts = {})
+  /// `parts`: what parts one cloud into frames; empty: nothing does. `beside`: arrays that may say
+  /// which points are none.
+  ArrayFrames(const std::string& path, OpenArray array, double fps, const FrameOptions& options,
+              const CloudArray& parts = {}, const std::vector<BesideArray>& beside = {})
       : path_(path),
         array_(std::move(array)),
         offset_(parts.offset),
         fps_(fps),
-        max_memory_(max_memory) {
+        max_memory_(options.max_memory),
+        origin_(options.origin),
+        far_(options.far) {
     if (!offset_.empty()) parted_ = parts.axes.remark;
     settle_memory();
     const ReadSteps steps = [&](int64_t first, int64_t count) { return read_steps(first, count); };
@@ -163,44 +173,69 @@ class ArrayFrames : public FrameSource {
       refuse_flat(array_.in->where(), array_.header);
     array_.axes = axes_by_numbers(array_.axes, array_.header.shape, steps);
     settle_memory();
+    const CloudAxes& axes = array_.axes;
+    end_ = all_frames();
+    if (offset_.empty())
+      padding_ = FramePadding(axes.sequences, axes.frames / std::max<int64_t>(axes.sequences, 1),
+                              axes.points, beside);
+    if (options.sequence) choose(*options.sequence);
     rewind();
   }
 
   std::optional<Frame> next() override {
-    if (at_ == frames()) return std::nullopt;
+    if (at_ == end_) return std::nullopt;
     Frame frame;
     const bool one = !array_.axes.sequence && offset_.empty();
     frame.source = one ? path_ : cat(path_, ":", at_);
+    frame.sequence = (at_ - begin_) / std::max<int64_t>(all_frames() / array_.axes.sequences, 1);
     read(frame);
+    if (offset_.empty()) padding_.cut(at_, frame.points);
     ++at_;
     frame.left_out = leave_out_non_finite(frame.points, frame.faces);
-    check_precision(frame.points, frame.source, kSubtract);
+    const bool single = array_.header.kind == 'f' && array_.header.width <= sizeof(float);
+    if (!far_) check_precision(frame.points, frame.source, single ? kSubtract : kDoctorMoves);
     return frame;
   }
   void skip() override {
-    if (at_ == frames()) return;
+    if (at_ == end_) return;
     if (!whole_) array_.in->skip(bytes_of_frame(at_));
     ++at_;
   }
   void rewind() override {
-    at_ = 0;
+    at_ = begin_;
+    padding_.restart();
     if (whole_) return;
-    array_.in->rewind();
-    array_.header = read_npy_header(*array_.in);
+    to_start();
+    for (int64_t f = 0; f < begin_; ++f) array_.in->skip(bytes_of_frame(f));
   }
-  int64_t frames() const override {
-    return offset_.empty() ? array_.axes.frames : std::ssize(offset_) - 1;
-  }
+  int64_t frames() const override { return end_ - begin_; }
+  int64_t sequences() const override { return chosen_ ? 1 : array_.axes.sequences; }
   double fps() const override { return fps_; }
   std::vector<std::string> remarks() const override {
     std::vector<std::string> out;
     for (const std::string& remark : {array_.axes.remark, parted_})
       if (!remark.empty())
         out.push_back(cat("an array ", shape_text(array_.header.shape), ": ", remark));
+    if (const std::string cut = padding_.remark(); !cut.empty()) out.push_back(cut);
     return out;
   }
 
  private:
+  int64_t all_frames() const {
+    return offset_.empty() ? array_.axes.frames : std::ssize(offset_) - 1;
+  }
+  /// From now on the array is this sequence.
+  void choose(int64_t sequence) {
+    check_sequence(path_, sequence, array_.axes.sequences);
+    const int64_t each = all_frames() / array_.axes.sequences;
+    begin_ = sequence * each;
+    end_ = begin_ + each;
+    chosen_ = true;
+  }
+  void to_start() {
+    array_.in->rewind();
+    array_.header = read_npy_header(*array_.in);
+  }
   int64_t first_point(int64_t frame) const {
     return offset_.empty() ? 0 : offset_[static_cast<size_t>(frame)];
   }
@@ -208,13 +243,13 @@ class ArrayFrames : public FrameSource {
     return offset_.empty() ? array_.axes.points : first_point(frame + 1) - first_point(frame);
   }
   uint64_t bytes_of_frame(int64_t frame) const {
-    if (offset_.empty()) return array_.header.bytes() / static_cast<uint64_t>(frames());
+    if (offset_.empty()) return array_.header.bytes() / static_cast<uint64_t>(all_frames());
     return array_.header.bytes() / static_cast<uint64_t>(array_.axes.points) *
            static_cast<uint64_t>(points_of(frame));
   }
   uint64_t most_bytes() const {
     uint64_t out = 0;
-    for (int64_t f = 0; f < (offset_.empty() ? 1 : frames()); ++f)
+    for (int64_t f = 0; f < (offset_.empty() ? 1 : all_frames()); ++f)
       out = std::max(out, bytes_of_frame(f));
     return out;
   }
@@ -226,7 +261,7 @@ class ArrayFrames : public FrameSource {
     if (array_.header.fortran || !array_.axes.in_order() || parted_columns) {
       array_.in->rewind();
       whole_.emplace(*array_.in, max_memory_);
-    } else if (frames() > 0 && most_bytes() > max_memory_) {
+    } else if (all_frames() > 0 && most_bytes() > max_memory_) {
       throw InputError(path_, cat("has frames of ", most_bytes(), " bytes"),
                        "allow more with {max-memory}");
     }
@@ -242,7 +277,7 @@ class ArrayFrames : public FrameSource {
       return out;
     }
     const auto bytes = static_cast<int64_t>(header.width) * step;
-    rewind();
+    to_start();
     array_.in->skip(static_cast<uint64_t>(first * bytes));
     const std::vector<char> all = array_.in->take(static_cast<uint64_t>(count * bytes));
     for (int64_t i = 0; i < count * step; ++i)
@@ -264,7 +299,7 @@ class ArrayFrames : public FrameSource {
                    : header.number(bytes.data() +
                                    axes.at(0, i, axis) * static_cast<int64_t>(header.width));
         frame.points[i][axis] = text::coordinate(
-            value, [&] { return frame.source; }, NonFinite::mark);
+            value - origin_[axis], [&] { return frame.source; }, NonFinite::mark);
       }
   }
 
@@ -274,21 +309,27 @@ class ArrayFrames : public FrameSource {
   std::string parted_;  // how; a remark
   double fps_;
   uint64_t max_memory_;
+  Vec3 origin_;
+  bool far_;  // no matter how far from the origin
+  FramePadding padding_;
   std::optional<NpyArray> whole_;
-  int64_t at_ = 0;
+  int64_t at_ = 0, begin_ = 0, end_ = 0;
+  bool chosen_ = false;  // one of several sequences
 };
 
 /// Arrays of an archive, a frame each.
 class SeriesFrames : public FrameSource {
  public:
-  SeriesFrames(Npz file, std::vector<std::string> names, double fps, uint64_t max_memory)
-      : file_(std::move(file)), names_(std::move(names)), fps_(fps), max_memory_(max_memory) {}
+  SeriesFrames(Npz file, std::vector<std::string> names, double fps, const FrameOptions& options)
+      : file_(std::move(file)), names_(std::move(names)), fps_(fps), options_(options) {
+    options_.sequence = std::nullopt;
+  }
 
   std::optional<Frame> next() override {
     if (at_ == std::ssize(names_)) return std::nullopt;
     const std::string& name = names_[static_cast<size_t>(at_++)];
     std::optional<Frame> frame =
-        ArrayFrames(file_.path(), open_array(file_.open(name)), fps_, max_memory_).next();
+        ArrayFrames(file_.path(), open_array(file_.open(name)), fps_, options_).next();
     frame->source = cat(file_.path(), ":", name);
     return frame;
   }
@@ -298,7 +339,7 @@ class SeriesFrames : public FrameSource {
   double fps() const override { return fps_; }
   std::vector<std::string> remarks() const override {
     std::vector<std::string> out =
-        ArrayFrames(file_.path(), open_array(file_.open(names_[0])), fps_, max_memory_).remarks();
+        ArrayFrames(file_.path(), open_array(file_.open(names_[0])), fps_, options_).remarks();
     out.push_back(cat("its ", names_.size(), " arrays, ", text::quote(names_[0]), " to ",
                       text::quote(names_.back()), ", are the frames of a sequence"));
     return out;
@@ -308,7 +349,7 @@ class SeriesFrames : public FrameSource {
   Npz file_;
   std::vector<std::string> names_;
   double fps_;
-  uint64_t max_memory_;
+  FrameOptions options_;
   int64_t at_ = 0;
 };
 
@@ -321,6 +362,16 @@ void refuse_flat_arrays(const Npz& file) {
       if (may_be && cloud_rank(name).has_value() == named)
         refuse_flat(cat(file.path(), ":", name), *header);
     }
+}
+
+/// InputError for an archive of depth pictures, with a camera's matrix beside them.
+void refuse_depth_pictures(const Npz& file) {
+  for (const std::string& name : file.names())
+    if (const auto header = header_if_readable(file, name);
+        header && are_depth_pictures(name, header->shape))
+      throw InputError(cat(file.path(), ":", name),
+                       cat("holds depth pictures ", shape_text(header->shape), ", not clouds"),
+                       "restage data import FILE --intrinsics FX,FY,CX,CY makes clouds of them");
 }
 
 }  // namespace
@@ -353,6 +404,7 @@ std::optional<CloudArray> find_cloud(const Npz& file) {
                      "perform --motions M.h5 makes clouds of it");
   const std::vector<CloudArray> found = unnamed_clouds(file);
   if (found.empty()) refuse_incomplete(file, parameters);
+  if (found.empty()) refuse_depth_pictures(file);
   if (found.empty()) refuse_flat_arrays(file);
   if (found.empty()) return std::nullopt;
   if (found.size() == 1) return with_frames(file, found[0]);
@@ -380,6 +432,18 @@ std::optional<CloudArray> find_cloud(const std::string& path, uint64_t max_memor
   return CloudArray{"", *axes, {}};
 }
 
+bool is_seen_by_camera(const std::string& path, uint64_t max_memory) {
+  if (!is_npz_name(path)) return false;
+  const Npz file(path, max_memory);
+  const std::optional<CloudArray> cloud = find_cloud(file);
+  const std::string name = cloud ? lower_case(cloud->name) : "";
+  if (name != "pred_vertices" && name != "pred_verts" && name != "verts" && name != "vertices")
+    return false;
+  for (const char* camera : {"pred_cam_t", "pred_cam", "orig_cam", "cam_t", "cam_trans"})
+    if (file.has(camera)) return true;
+  return false;
+}
+
 std::optional<double> stated_fps(const std::string& path, uint64_t max_memory) {
   if (!is_npz_name(path)) return std::nullopt;
   const Npz file(path, max_memory);
@@ -399,16 +463,17 @@ std::unique_ptr<FrameSource> open_array_frames(const std::string& path,
   const double fps = stated_fps(path, max_memory).value_or(kFps);
   if (!is_npz_name(path))
     return std::make_unique<ArrayFrames>(path, open_array(std::make_unique<FileStream>(path)), fps,
-                                         max_memory);
+                                         options);
   Npz file(path, max_memory);
   const CloudArray cloud = need_cloud(file);
   std::vector<std::string> series;
   if (cloud.name.empty()) series = series_of(names_of(unnamed_clouds(file)), path);
+  if (!series.empty() && options.sequence) check_sequence(path, *options.sequence, 1);
   if (!series.empty())
-    return std::make_unique<SeriesFrames>(std::move(file), std::move(series), fps, max_memory);
+    return std::make_unique<SeriesFrames>(std::move(file), std::move(series), fps, options);
   const int64_t vertices = vertices_beside(file, file.header(cloud.name));
   return std::make_unique<ArrayFrames>(path, open_array(file.open(cloud.name), vertices), fps,
-                                       max_memory, cloud);
+                                       options, cloud, beside(file, cloud.name, true));
 }
 
 Frame read_array_frame(const std::string& path, const FrameOptions& options) {

@@ -39,6 +39,10 @@ std::optional<CloudArray> find_cloud(const Npz& file);
 /// The same of an NPY or NPZ file.
 std::optional<CloudArray> find_cloud(const std::string& path, uint64_t max_memory = kMaxMemory);
 
+/// Whether the cloud is a body as a pose estimator saw it: vertices beside the numbers of a camera
+/// (SAM 3D Body, 4DHumans, ROMP). Its y points down.
+bool is_seen_by_camera(const std::string& path, uint64_t max_memory = kMaxMemory);
+
 /// The frame rate that an array file states, if it does.
 std::optional<double> stated_fps(const std::string& path, uint64_t max_memory = kMaxMemory);
 

@@ -4,12 +4,17 @@
 #include <filesystem>
 #include <span>
 
+#include "autograd/base/atomic_file.h"
+#include "autograd/base/words.h"
 #include "datasets/readers/clouds/mesh_io.h"
+#include "datasets/readers/clouds/precision.h"
+#include "datasets/readers/clouds/table_frames.h"
 #include "datasets/readers/errors.h"
 #include "datasets/readers/foreign_kinds.h"
 #include "datasets/readers/frames/array_frames.h"
 #include "datasets/readers/frames/hdf5_frames.h"
 #include "datasets/readers/gltf/gltf.h"
+#include "datasets/readers/text/text.h"
 
 namespace restage {
 namespace {
@@ -42,18 +47,27 @@ class FileFrames : public FrameSource {
     return frame;
   }
   void skip() override { at_ = std::min(at_ + 1, list_.files.size()); }
-  void rewind() override { at_ = 0; }
+  void rewind() override { at_ = faint_ = 0; }
   int64_t frames() const override { return std::ssize(list_.files); }
   double fps() const override { return kFps; }
-  std::vector<std::string> remarks() const override { return list_.remarks; }
+  std::vector<std::string> remarks() const override {
+    std::vector<std::string> out = list_.remarks;
+    if (faint_ > 0)
+      out.push_back(cat("left out ", counted(faint_, "splat"), " of an opacity below a tenth"));
+    return out;
+  }
   std::vector<int64_t> numbers() const override { return list_.numbers; }
 
  private:
-  Frame read(const std::string& file) const {
+  Frame read(const std::string& file) {
     Frame frame;
     if (file.ends_with('/')) return frame;  // a folder without a frame
     if (is_array_name(file)) return read_array_frame(file, options_);
-    Mesh mesh = read_frame_mesh(file, frame.left_out);
+    LeftOut left_out;
+    Mesh mesh = read_frame_mesh(file, left_out, options_.origin);
+    if (!options_.far) check_precision(mesh.vertices, file, kDoctorMoves);
+    frame.left_out = left_out.non_finite;
+    faint_ += left_out.faint;
     frame.points = std::move(mesh.vertices);
     frame.faces = std::move(mesh.faces);
     return frame;
@@ -62,7 +76,54 @@ class FileFrames : public FrameSource {
   FrameList list_;
   FrameOptions options_;
   size_t at_ = 0;
+  size_t faint_ = 0;  // splats that were left out
 };
+
+/// A table of points that holds a whole recording.
+class RecordedTable : public FrameSource {
+ public:
+  RecordedTable(std::string path, TableFrames table, bool far)
+      : path_(std::move(path)), table_(std::move(table)), far_(far) {}
+  std::optional<Frame> next() override {
+    if (at_ == frames()) return std::nullopt;
+    const auto at = table_.points.begin();
+    const int64_t begin = table_.offset[static_cast<size_t>(at_)];
+    const int64_t end = table_.offset[static_cast<size_t>(at_) + 1];
+    Frame frame;
+    frame.source = cat(path_, ":", at_++);
+    frame.points.assign(at + begin, at + end);
+    frame.left_out = leave_out_non_finite(frame.points, frame.faces);
+    if (!far_) check_precision(frame.points, frame.source, kDoctorMoves);
+    return frame;
+  }
+  void skip() override { at_ = std::min(at_ + 1, frames()); }
+  void rewind() override { at_ = 0; }
+  int64_t frames() const override { return std::ssize(table_.offset) - 1; }
+  double fps() const override { return table_.fps > 0 ? table_.fps : kFps; }
+  std::vector<std::string> remarks() const override { return {table_.remark}; }
+
+ private:
+  std::string path_;
+  TableFrames table_;
+  bool far_;
+  int64_t at_ = 0;
+};
+
+/// Nothing if the file holds one cloud, or what reads that says what is wrong.
+std::unique_ptr<FrameSource> open_recorded_table(const std::string& path,
+                                                 const FrameOptions& options) {
+  const bool text =
+      (is_cloud_name(path) || may_be_cloud_name(path)) && !text::ends_in(path, {".pcd", ".bin"});
+  if (!text) return nullptr;
+  try {
+    const std::string content = read_file(path);
+    if (!names_frames(content)) return nullptr;
+    if (auto table = parse_table_frames(content, path, options.origin))
+      return std::make_unique<RecordedTable>(path, std::move(*table), options.far);
+  } catch (const InputError&) {
+  }
+  return nullptr;
+}
 
 /// A character that performs a clip.
 class ClipFrames : public FrameSource {
@@ -94,6 +155,8 @@ class ClipFrames : public FrameSource {
 }  // namespace
 
 std::unique_ptr<FrameSource> open_frame_list(FrameList list, const FrameOptions& options) {
+  if (list.files.size() == 1)
+    if (auto table = open_recorded_table(list.files[0], options)) return table;
   return std::make_unique<FileFrames>(std::move(list), options);
 }
 
@@ -102,7 +165,8 @@ std::unique_ptr<FrameSource> open_frames(const std::string& path, const FrameOpt
   const bool folder = fs::is_directory(path, error);
   if (!folder) refuse_foreign_content(path);
   if (!folder && is_hdf5(path) && options.clip.empty()) return open_hdf5_frames(path, options);
-  if (options.sequence) check_sequence(path, *options.sequence, 1);
+  const bool array = !folder && is_array_name(path) && options.clip.empty();
+  if (options.sequence && !array) check_sequence(path, *options.sequence, 1);
   if (!folder && is_gltf_name(path)) {
     Gltf file = read_gltf(path);
     if (file.vertices.empty() && !file.clips.empty())
@@ -127,6 +191,16 @@ std::unique_ptr<FrameSource> open_frames(const std::string& path, const FrameOpt
   FrameList one;
   one.files = {path};
   return open_frame_list(std::move(one), options);
+}
+
+Vec3 far_origin(const std::string& path, const FrameOptions& options) {
+  FrameOptions anywhere = options;
+  anywhere.far = true;
+  const std::unique_ptr<FrameSource> frames = open_frames(path, anywhere);
+  while (const std::optional<Frame> frame = frames->next())
+    if (!frame->points.empty())
+      return is_blurred(frame->points) ? Vec3(frame->points[0].cast<double>()) : Vec3(Vec3::Zero());
+  return Vec3::Zero();
 }
 
 namespace {

@@ -47,6 +47,9 @@ struct FrameOptions {
   uint64_t max_memory = kMaxMemory;  ///< what unpacking an array may take
   std::optional<int64_t> sequence =
       std::nullopt;  ///< only this one, from 0; else all, one after the other
+  /// Taken off all coordinates before they become floats (far_origin()).
+  Vec3 origin = Vec3::Zero();
+  bool far = false;  ///< frames that single precision blurs are no error
 };
 
 /// A folder of numbered files of one frame each (PLY, OBJ, PCD, tables of points, glTF, arrays; in
@@ -56,6 +59,10 @@ struct FrameOptions {
 /// Of a frame that is there as several kinds of files one is taken. InputError if there is nothing
 /// to read, or a clip or sequence is named that is not there.
 std::unique_ptr<FrameSource> open_frames(const std::string& path, const FrameOptions& options = {});
+
+/// Where frames lie that single precision would blur (precision.h): a point of the first one that
+/// has some. Zero for others.
+Vec3 far_origin(const std::string& path, const FrameOptions& options = {});
 
 /// All files of a folder that could be frames, in natural order.
 std::vector<std::string> frame_files(const std::string& folder);

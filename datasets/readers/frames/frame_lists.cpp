@@ -28,9 +28,9 @@ std::string ending_of(const std::string& path) {
 
 /// Of one frame in several kinds of files the first of these is taken, unless there are more files
 /// of another.
-constexpr std::string_view kEndings[] = {".ply", ".obj", ".pcd",    ".glb",  ".gltf",
-                                         ".vrm", ".xyz", ".xyzrgb", ".xyzn", ".pts",
-                                         ".asc", ".npz", ".npy",    ".csv",  ".txt"};
+constexpr std::string_view kEndings[] = {".ply", ".obj",    ".pcd",  ".glb", ".gltf", ".vrm",
+                                         ".xyz", ".xyzrgb", ".xyzn", ".pts", ".asc",  ".npz",
+                                         ".npy", ".csv",    ".txt",  ".bin"};
 
 size_t rank_of(const std::string& ending) {
   return static_cast<size_t>(std::find(std::begin(kEndings), std::end(kEndings), ending) -
@@ -48,11 +48,11 @@ std::vector<std::string> candidates_in(const std::string& folder) {
     std::error_code ignored;
     if (item->path().filename().string()[0] == '.' || item->is_directory(ignored)) continue;
     if (is_mesh_name(path) || is_cloud_name(path) || is_array_name(path)) out.push_back(path);
-    if (is_text_name(path)) texts.push_back(path);
+    if (may_be_cloud_name(path)) texts.push_back(path);
   }
   if (error) throw InputError(folder, "cannot be read (" + error.message() + ")", "check the path");
   if (out.empty())
-    std::copy_if(texts.begin(), texts.end(), std::back_inserter(out), is_table_of_points);
+    std::copy_if(texts.begin(), texts.end(), std::back_inserter(out), is_cloud_by_content);
   return out;
 }
 
@@ -166,13 +166,14 @@ std::vector<FilesByName> files_of(const std::vector<std::string>& folders) {
     std::vector<std::string>& files = all.emplace_back();
     for (const std::string& inner : folders_below(folder))
       for (const std::string& file : candidates_in(inner)) files.push_back(file);
-    only_texts = only_texts && std::all_of(files.begin(), files.end(), is_text_name);
+    only_texts = only_texts && std::all_of(files.begin(), files.end(), may_be_cloud_name);
   }
   std::vector<FilesByName> out;
   for (size_t i = 0; i < folders.size(); ++i) {
     FilesByName& names = out.emplace_back();
     for (const std::string& file : all[i])
-      if (only_texts || !is_text_name(file)) names[name_below(folders[i], file)].push_back(file);
+      if (only_texts || !may_be_cloud_name(file))
+        names[name_below(folders[i], file)].push_back(file);
   }
   return out;
 }

@@ -12,7 +12,8 @@
 #include "datasets/readers/clouds/non_finite.h"
 #include "datasets/readers/clouds/precision.h"
 #include "datasets/readers/errors.h"
-#include "datasets/readers/frames/frame_names.h"
+#include "datasets/readers/frames/hdf5_clouds.h"
+#include "datasets/readers/frames/padding.h"
 #include "datasets/readers/frames/ragged_frames.h"
 #include "datasets/readers/text/text.h"
 #include "datasets/schema.h"
@@ -104,144 +105,6 @@ std::unique_ptr<FrameSource> open_ours(h5::File file, const FrameOptions& option
 
 // ---- files of others ---------------------------------------------------------------------------
 
-constexpr int kGroupDepth = 6;        // of groups that are looked into
-constexpr size_t kMostSets = 200000;  // a frame each
-
-/// A sequence is one data set, or one a frame.
-struct Sequence {
-  std::vector<std::string> sets;
-  std::vector<std::string> remarks;
-};
-
-/// InputError for a data set whose rows may be x y z of one point after the other.
-void refuse_flat(const h5::Dataset& set) {
-  if (const auto mend = flat_mend(set.shape()))
-    throw InputError(set.where(),
-                     cat("is a flat data set ", shape_text(set.shape()), ", and no cloud"), *mend);
-}
-
-/// All that has the shape of a cloud or a sequence.
-class Finder {
- public:
-  /// `vertices`: how many there are, if the file says it; else 0.
-  explicit Finder(const h5::File& file, int64_t vertices = 0) : file_(file), vertices_(vertices) {
-    walk("", 0);
-  }
-
-  bool any() const { return !found_.empty(); }
-
-  std::vector<Sequence> find() const {
-    if (file_.has("/bodies") || file_.has("/motions"))
-      throw InputError(file_.path(), "holds bodies or motions, not scans",
-                       "restage data perform makes scans of them");
-    std::vector<std::string> sequences, clouds, left_out = others_;
-    for (const Candidate& one : found_) {
-      if (one.rank > best_)
-        left_out.push_back(one.name);
-      else
-        (one.sequence ? sequences : clouds).push_back(one.name);
-    }
-    std::vector<Sequence> out;
-    out.reserve(sequences.size());
-    for (const std::string& name : sequences) out.push_back({{name}, {}});
-    if (out.empty() && !clouds.empty()) out.push_back(series(clouds));
-    if (out.empty()) throw_no_clouds();
-    if (!sequences.empty()) left_out.insert(left_out.end(), clouds.begin(), clouds.end());
-    if (!left_out.empty())
-      out[0].remarks.push_back(cat("clouds are taken from ", text::quote(out[0].sets[0]),
-                                   out.size() > 1 ? " and others" : "",
-                                   "; left out: " + list_of(left_out)));
-    return out;
-  }
-
- private:
-  struct Candidate {
-    std::string name;
-    bool sequence;
-    size_t rank;  ///< cloud_rank(); of other names kUnnamed
-  };
-  static constexpr size_t kUnnamed = 1000;
-
-  /// Says what the file holds instead.
-  [[noreturn]] void throw_no_clouds() const {
-    std::vector<std::string> last;
-    for (const std::string& name : all_) last.push_back(name.substr(name.rfind('/') + 1));
-    const BodyParameters parameters = body_parameters(last);
-    if (parameters.moves() || !parameters.body.empty() || !parameters.orient.empty())
-      throw InputError(
-          file_.path(),
-          cat("holds a motion of a body model (its data sets: ", list_of(all_), "), not clouds"),
-          "save these data sets as an NPZ (numpy.savez) with the same names; restage "
-          "data import FILE.npz --body-model MODEL --out M.h5 reads it");
-    for (const std::string& name : all_)
-      if (!is_no_cloud(name, true)) refuse_flat(file_.dataset(name));
-    throw InputError(
-        file_.path() + ":/points", "is missing, and so is /vertices",
-        "give a file of scans (/points, /frame_offset) or surfaces (/vertices [F, V, 3])");
-  }
-
-  void walk(const std::string& group, int depth) {
-    for (const std::string& child : file_.children(group.empty() ? "/" : group)) {
-      const std::string name = group + "/" + child;
-      if (found_.size() >= kMostSets)
-        throw InputError(file_.path(), cat("holds more than ", kMostSets, " data sets of points"),
-                         "split it");
-      if (!file_.is_group(name))
-        consider(name, child);
-      else if (depth + 1 < kGroupDepth && !child.starts_with("#"))  // MATLAB's own
-        walk(name, depth + 1);
-    }
-  }
-
-  void consider(const std::string& name, const std::string& child) {
-    try {
-      const h5::Dataset set = file_.dataset(name);
-      if (set.type() == h5::Type::text) return;
-      if (all_.size() < kMostListed) all_.push_back(name);
-      const auto axes = cloud_axes(set.shape(), vertices_);
-      if (!axes) return;
-      if (is_no_cloud(child, !axes->sequence)) {
-        if (set.type() == h5::Type::floating) others_.push_back(name);
-        return;
-      }
-      const size_t rank = cloud_rank(child).value_or(kUnnamed);
-      found_.push_back({name, axes->sequence, rank});
-      best_ = std::min(best_, rank);
-    } catch (const InputError&) {
-      // Nothing that can be read, so no cloud.
-    }
-  }
-
-  /// Single clouds are the frames of a sequence if their names are a series.
-  Sequence series(const std::vector<std::string>& clouds) const {
-    if (clouds.size() == 1) return {clouds, {}};
-    std::vector<std::string> names;
-    for (std::string name : clouds) {
-      std::replace(name.begin(), name.end(), '/', ' ');
-      names.push_back(name);
-    }
-    FrameList list = order_members(names, file_.path());
-    if (list.files.empty())
-      throw InputError(file_.path(), "holds several arrays of points: " + list_of(clouds),
-                       "keep one, or name the frames' groups or data sets by numbers");
-    Sequence out{{}, list.remarks};
-    for (std::string& name : list.files) {
-      const auto at = std::find(names.begin(), names.end(), name);
-      out.sets.push_back(clouds[static_cast<size_t>(at - names.begin())]);
-    }
-    return out;
-  }
-
-  static constexpr size_t kMostListed = 64;
-
-  const h5::File& file_;
-  int64_t vertices_;
-  std::vector<std::string> all_;  ///< data sets of numbers, the first of them
-  std::vector<Candidate> found_;
-  std::vector<std::string> others_;  ///< of the shape of clouds, by their names none
-  size_t best_ = kUnnamed;
-};
-
 /// How many vertices the triangles of a file speak of; 0: it has none.
 int64_t vertices_by_faces(const h5::File& file) {
   for (const char* name : {"/faces", "/f", "/triangles"}) {
@@ -254,25 +117,34 @@ int64_t vertices_by_faces(const h5::File& file) {
   return 0;
 }
 
+/// The numbers in the group of a data set.
+std::vector<BesideArray> beside(const h5::File& file, const std::string& name) {
+  const std::string group = name.substr(0, name.rfind('/'));
+  std::vector<BesideArray> out;
+  for (const std::string& child : file.children(group.empty() ? "/" : group)) {
+    const std::string path = group + "/" + child;
+    if (path == name || file.is_group(path)) continue;
+    try {
+      const h5::Dataset set = file.dataset(path);
+      if (set.type() != h5::Type::integer && set.type() != h5::Type::floating) continue;
+      const auto read = [&file, path] { return file.dataset(path).read<double>(); };
+      out.push_back({child, set.shape(), set.type() == h5::Type::integer, read});
+    } catch (const InputError&) {
+      // Nothing that can be read, so it says nothing.
+    }
+  }
+  return out;
+}
+
 /// Offsets of the frames of the only cloud of a file, if a data set in its group parts it into
 /// frames; `name` becomes that cloud's.
 std::optional<RaggedFrames> parted_cloud(const h5::File& file, std::string& name) {
-  const std::vector<Sequence> found = Finder(file, vertices_by_faces(file)).find();
+  const std::vector<Hdf5Sequence> found = find_clouds(file, vertices_by_faces(file));
   if (found.size() != 1 || found[0].sets.size() != 1) return std::nullopt;
   name = found[0].sets[0];
   const h5::Shape shape = file.dataset(name).shape();
   if (shape.size() != 2 || shape[1] != 3) return std::nullopt;
-  const std::string group = name.substr(0, name.rfind('/'));
-  std::vector<BesideArray> beside;
-  for (const std::string& child : file.children(group.empty() ? "/" : group)) {
-    const std::string path = group + "/" + child;
-    if (path == name || file.is_group(path)) continue;
-    const h5::Dataset set = file.dataset(path);
-    if (set.type() != h5::Type::integer && set.type() != h5::Type::floating) continue;
-    const auto read = [&file, path] { return file.dataset(path).read<double>(); };
-    beside.push_back({child, set.shape(), set.type() == h5::Type::integer, read});
-  }
-  return ragged_frames(file.path(), shape[0], beside);
+  return ragged_frames(file.path(), shape[0], beside(file, name));
 }
 
 /// Surfaces, or joints and no clouds beside them.
@@ -281,7 +153,7 @@ bool is_our_prediction(const h5::File& file) {
     const h5::Shape shape = file.dataset("/vertices").shape();
     if (shape.size() == 3 && shape[2] == 3) return true;
   }
-  return file.has("/joints") && !Finder(file).any();
+  return file.has("/joints") && !has_clouds(file);
 }
 
 class ForeignFrames : public FrameSource {
@@ -289,15 +161,19 @@ class ForeignFrames : public FrameSource {
   ForeignFrames(h5::File file, const FrameOptions& options)
       : file_(std::move(file)),
         max_memory_(options.max_memory),
+        origin_(options.origin),
+        far_(options.far),
         vertices_(vertices_by_faces(file_)),
-        found_(Finder(file_, vertices_).find()),
+        found_(find_clouds(file_, vertices_)),
         fps_(read_fps(file_)) {
+    for (const Hdf5Sequence& sequence : found_)
+      axes_of(file_.dataset(sequence.sets[0]));  // or refuses
+    part_windows();
     if (options.sequence) {
       check_sequence(file_.path(), *options.sequence, sequences());
       found_ = {found_[static_cast<size_t>(*options.sequence)]};
     }
-    for (const Sequence& sequence : found_) axes_of(file_.dataset(sequence.sets[0]));  // or refuses
-    for (const Sequence& sequence : found_)
+    for (const Hdf5Sequence& sequence : found_)
       for (const std::string& set : sequence.sets) frames_ += frames_of(file_.dataset(set));
     if (frames_ == 0)
       throw InputError(file_.path(), "holds no frames", "give a file with at least one frame");
@@ -311,16 +187,18 @@ class ForeignFrames : public FrameSource {
     frame.source =
         axes_.sequence ? cat(file_.path(), ":", name, ":", at_) : cat(file_.path(), ":", name);
     frame.sequence = static_cast<int64_t>(sequence_);
-    std::vector<float> row;
-    if (whole_.empty() && axes_.sequence) open_->read_rows(at_, 1, row);
-    const std::vector<float>& values = row.empty() ? whole_ : row;
-    const int64_t f = row.empty() ? at_ : 0;
+    const int64_t f = read_row();
     frame.points.resize(axes_.points);
     for (int64_t i = 0; i < axes_.points; ++i)
-      for (int axis = 0; axis < 3; ++axis) frame.points[i][axis] = values[axes_.at(f, i, axis)];
+      for (int axis = 0; axis < 3; ++axis)
+        frame.points[i][axis] = text::coordinate(
+            values_[axes_.at(f, i, axis)] - origin_[axis], [&] { return frame.source; },
+            NonFinite::mark);
+    if (vertices_ == 0) padding_.cut(at_, frame.points);
     ++at_;
     frame.left_out = leave_out_non_finite(frame.points, frame.faces);
-    check_precision(frame.points, frame.source, kSubtract);
+    const bool single = open_->type() == h5::Type::floating && open_->value_size() <= sizeof(float);
+    if (!far_) check_precision(frame.points, frame.source, single ? kSubtract : kDoctorMoves);
     return frame;
   }
   void skip() override {
@@ -330,6 +208,7 @@ class ForeignFrames : public FrameSource {
   }
   void rewind() override {
     sequence_ = set_ = 0;
+    padding_.restart();
     close();
   }
   int64_t frames() const override { return frames_; }
@@ -337,7 +216,8 @@ class ForeignFrames : public FrameSource {
   double fps() const override { return fps_; }
   std::vector<std::string> remarks() const override {
     std::vector<std::string> out;
-    for (const Sequence& sequence : found_) {
+    for (const Hdf5Sequence& sequence : found_) {
+      if (sequence.window > 0 && &sequence != found_.data()) continue;  // said of the first
       const h5::Dataset set = file_.dataset(sequence.sets[0]);
       const CloudAxes axes = axes_of(set);
       if (!axes.remark.empty())
@@ -345,6 +225,7 @@ class ForeignFrames : public FrameSource {
             cat(text::quote(sequence.sets[0]), " ", shape_text(set.shape()), ": ", axes.remark));
       out.insert(out.end(), sequence.remarks.begin(), sequence.remarks.end());
     }
+    if (const std::string cut = padding_.remark(); !cut.empty()) out.push_back(cut);
     return out;
   }
 
@@ -356,17 +237,46 @@ class ForeignFrames : public FrameSource {
       return out;
     };
     const CloudAxes axes = *cloud_axes(set.shape(), vertices_);
-    if (rows_are_frames(axes, set.shape(), read)) refuse_flat(set);
+    if (rows_are_frames(axes, set.shape(), read)) refuse_flat_set(set);
     return axes_by_numbers(axes, set.shape(), read, vertices_);
   }
+  /// Of one of its sequences.
   int64_t frames_of(const h5::Dataset& set) const {
-    return cloud_axes(set.shape(), vertices_)->sequence ? axes_of(set).frames : 1;
+    if (!cloud_axes(set.shape(), vertices_)->sequence) return 1;
+    const CloudAxes axes = axes_of(set);
+    return axes.frames / axes.sequences;
+  }
+
+  /// A data set of several sequences becomes several.
+  void part_windows() {
+    std::vector<Hdf5Sequence> out;
+    for (const Hdf5Sequence& sequence : found_) {
+      const h5::Dataset set = file_.dataset(sequence.sets[0]);
+      const bool several =
+          sequence.sets.size() == 1 && cloud_axes(set.shape(), vertices_)->sequences > 1;
+      const int64_t windows = several ? axes_of(set).sequences : 1;
+      for (int64_t w = 0; w < windows; ++w)
+        out.push_back({sequence.sets, w == 0 ? sequence.remarks : std::vector<std::string>(), w});
+    }
+    found_ = std::move(out);
+  }
+
+  /// Makes values_ those of frame at_, or of all; gives the frame's number among them.
+  int64_t read_row() {
+    if (whole_) return at_;
+    const int64_t rows = std::max<int64_t>(open_->rows(), 1);
+    const int64_t each = std::max<int64_t>(axes_.frames / rows, 1);
+    if (at_ / each != row_) {
+      row_ = at_ / each;
+      open_->read_rows(row_, 1, values_);
+    }
+    return at_ % each;
   }
 
   /// Goes on to a set that has frames left; false at the end.
   bool find_place() {
     while (sequence_ < found_.size()) {
-      if (open_ && at_ < axes_.frames) return true;
+      if (open_ && at_ < end_) return true;
       if (!open_) {
         if (frames_of(file_.dataset(found_[sequence_].sets[set_])) > 0) return true;
       }
@@ -381,33 +291,46 @@ class ForeignFrames : public FrameSource {
   void open(const std::string& name) {
     open_.emplace(file_.dataset(name));
     axes_ = axes_of(*open_);
-    at_ = 0;
-    whole_.clear();
-    if (axes_.sequence && axes_.in_order()) return;
+    const int64_t each = axes_.frames / axes_.sequences;
+    at_ = found_[sequence_].window * each;
+    end_ = at_ + each;
+    row_ = -1;
+    if (name != padded_)
+      padding_ = FramePadding(axes_.sequences, each, axes_.points, beside(file_, name));
+    padded_ = name;
+    whole_ = !axes_.sequence || !axes_.in_order();
+    if (!whole_) return;
     const auto values =
         static_cast<uint64_t>(open_->rows()) * static_cast<uint64_t>(open_->row_size());
-    if (values > max_memory_ / sizeof(float))
-      throw InputError(open_->where(), cat("takes ", values * sizeof(float), " bytes"),
+    if (values > max_memory_ / sizeof(double))
+      throw InputError(open_->where(), cat("takes ", values * sizeof(double), " bytes"),
                        "allow more with {max-memory}");
-    whole_ = open_->read<float>();
+    values_ = open_->read<double>();
   }
 
   void close() {
     open_.reset();
-    whole_.clear();
+    values_.clear();
+    whole_ = false;
     at_ = 0;
   }
 
   h5::File file_;
   uint64_t max_memory_;
+  Vec3 origin_;
+  bool far_;  // no matter how far from the origin
   int64_t vertices_;
-  std::vector<Sequence> found_;
+  std::vector<Hdf5Sequence> found_;
   double fps_;
-  int64_t frames_ = 0, at_ = 0;
+  int64_t frames_ = 0, at_ = 0, end_ = 0;
   size_t sequence_ = 0, set_ = 0;
   std::optional<h5::Dataset> open_;
   CloudAxes axes_;
-  std::vector<float> whole_;  // where a frame is spread over the data set
+  FramePadding padding_;
+  std::string padded_;  // data set that it is of
+  bool whole_ = false;  // values_ are all, where a frame is spread over the data set
+  int64_t row_ = -1;    // else those of this row
+  std::vector<double> values_;
 };
 
 }  // namespace
@@ -438,6 +361,8 @@ bool is_foreign_hdf5(const std::string& path) {
   return !is_our_scans(file) && !is_our_prediction(file) && !file.has("/bodies") &&
          !file.has("/motions");
 }
+
+bool holds_clouds(const std::string& path) { return has_clouds(open_schema_file(path)); }
 
 bool states_fps(const std::string& path) {
   return open_schema_file(path).number("/", "fps").has_value();

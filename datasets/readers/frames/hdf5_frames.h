@@ -15,6 +15,9 @@ bool is_hdf5(const std::string& path);
 /// Whether the clouds of a file are not laid out as ours (datasets/README.md).
 bool is_foreign_hdf5(const std::string& path);
 
+/// Whether such a file has something of the shape of a cloud.
+bool holds_clouds(const std::string& path);
+
 /// Whether a file says its frame rate.
 bool states_fps(const std::string& path);
 

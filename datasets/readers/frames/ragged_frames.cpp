@@ -16,12 +16,42 @@ namespace {
 
 using Numbers = std::vector<int64_t>;
 
-constexpr std::string_view kLengths[] = {
-    "lengths",           "length",          "lens",    "counts",    "count",     "sizes",
-    "numpoints",         "npoints",         "numpts",  "npts",      "numverts",  "nverts",
-    "numvertices",       "nvertices",       "num",     "nums",      "perframe",  "numperframe",
-    "pointnum",          "pointsnum",       "perscan", "percloud",  "numframes", "nframes",
-    "numpointsperframe", "npointsperframe", "seqlens", "seqlengths"};
+constexpr std::string_view kLengths[] = {"lengths",
+                                         "length",
+                                         "lens",
+                                         "counts",
+                                         "count",
+                                         "sizes",
+                                         "numpoints",
+                                         "npoints",
+                                         "numpts",
+                                         "npts",
+                                         "numverts",
+                                         "nverts",
+                                         "numvertices",
+                                         "nvertices",
+                                         "num",
+                                         "nums",
+                                         "perframe",
+                                         "numperframe",
+                                         "pointnum",
+                                         "pointsnum",
+                                         "perscan",
+                                         "percloud",
+                                         "numframes",
+                                         "nframes",
+                                         "numpointsperframe",
+                                         "npointsperframe",
+                                         "seqlens",
+                                         "seqlengths",
+                                         "numvalid",
+                                         "nvalid",
+                                         "validpoints",
+                                         "validlengths",
+                                         "validcounts",
+                                         "validnum",
+                                         "lensequences",
+                                         "lenseqs"};
 constexpr std::string_view kOffsets[] = {
     "offset",    "offsets", "starts",     "start",    "splits",     "split",       "ptr",
     "ptrs",      "indptr",  "begins",     "begin",    "ends",       "end",         "cumsum",
@@ -131,6 +161,8 @@ int64_t length_of(const BesideArray& array) {
 
 }  // namespace
 
+bool names_lengths(const std::string& name) { return role_of(name) == Role::lengths; }
+
 std::optional<RaggedFrames> ragged_frames(const std::string& file, int64_t points,
                                           const std::vector<BesideArray>& beside) {
   const BesideArray* unfit = nullptr;
@@ -148,7 +180,8 @@ std::optional<RaggedFrames> ragged_frames(const std::string& file, int64_t point
       const Numbers numbers = whole_numbers(array.read());
       if (numbers.empty()) continue;
       const bool one_frame = role == Role::offsets || numbers[0] == points || numbers[0] == 1;
-      if (length == 1 && one_frame) continue;
+      const bool filled_up = role == Role::lengths && numbers[0] < points;  // padding.h
+      if (length == 1 && (one_frame || filled_up)) continue;
       Numbers offset = fitted(role, numbers, points);
       if (offset.size() > 2) return RaggedFrames{array.name, std::move(offset)};
       if (!offset.empty()) continue;

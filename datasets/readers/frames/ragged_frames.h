@@ -23,6 +23,9 @@ struct RaggedFrames {
   std::vector<int64_t> offset;  ///< frame f has the points [offset[f], offset[f + 1])
 };
 
+/// Whether an array of this name says how many points or frames there are.
+bool names_lengths(const std::string& name);
+
 /// How the frames of `points` points lie, if an array beside them tells it: lengths whose sum is
 /// the number of points (lengths, num_points, counts ...), offsets that begin with 0 and grow to
 /// that number or to the last frame's start (frame_offset, splits, ptr, starts ...), ends, or a

@@ -86,32 +86,40 @@ int run_import(ImportArguments arguments, const Common& common) {
 }  // namespace
 
 void add_data_import(Program& program, CommandOptions group) {
-  auto [app, given] =
-      program.add(group, "import", "turn bodies, motions, characters or scans into a data file",
-                  "restage data import DATA_FOLDER --out real.h5\n"
-                  "restage data import walk.bvh --subject ann --license CC0-1.0 --out walk.h5\n"
-                  "restage data import recordings/ --subjects '([^/]+)/.*' --out people.h5\n"
-                  "restage data import 07_01.amc --asf 07.asf --out walk.h5\n"
-                  "restage data import hero.glb --license CC0-1.0 --out hero.h5\n"
-                  "restage data import AMASS/ --body-model smplh/ --out amass.h5\n"
-                  "restage data import SMPLX_NEUTRAL.npz --betas zeros people.npz --out bodies.h5\n"
-                  "restage data import scans/ --fps 60 --scale 0.001 --out scans.h5\n"
-                  "restage data import --source a.bvh --bones mixamo --up z --facing x --split "
-                  "test --out a.h5\n"
-                  "restage data import a.bvh --rest-frame 0 --drop-leading 1 --force --out a.h5\n"
-                  "restage data import cmu_more/clips30_more.h5 --without ShovelHand --out "
-                  "more.h5\n"
-                  "restage data import hero.glb --clip Walk --out walk.h5\n"
-                  "restage data import DATA_FOLDER --garment male_casualsuit04 --out dressed.h5",
-                  run_import);
+  auto [app, given] = program.add(
+      group, "import", "turn bodies, motions, characters or scans into a data file",
+      "restage data import DATA_FOLDER --out real.h5\n"
+      "restage data import walk.bvh --subject ann --license CC0-1.0 --out walk.h5\n"
+      "restage data import recordings/ --subjects '([^/]+)/.*' --out people.h5\n"
+      "restage data import 07_01.amc --asf 07.asf --out walk.h5\n"
+      "restage data import hero.glb --license CC0-1.0 --out hero.h5\n"
+      "restage data import AMASS/ --body-model smplh/ --out amass.h5\n"
+      "restage data import joints.npy --layout coco17 --fps 25 --out seen.h5\n"
+      "restage data import wham_output.pkl --body-model SMPL_NEUTRAL.npz --person 3 "
+      "--out seen.h5\n"
+      "restage data import SMPLX_NEUTRAL.npz --betas zeros people.npz --out bodies.h5\n"
+      "restage data import scans/ --fps 60 --scale 0.001 --out scans.h5\n"
+      "restage data import --source a.bvh --bones mixamo --up z --facing x --split "
+      "test --out a.h5\n"
+      "restage data import a.bvh --rest-frame 0 --drop-leading 1 --force --out a.h5\n"
+      "restage data import cmu_more/clips30_more.h5 --without ShovelHand --out "
+      "more.h5\n"
+      "restage data import hero.glb --clip Walk --out walk.h5\n"
+      "restage data import depth/ --intrinsics 525,525,319.5,239.5 --depth-scale 0.0002 "
+      "--out seen.h5\n"
+      "restage data import depth/ --intrinsics camera.json --keep-background --out "
+      "room.h5\n"
+      "restage data import DATA_FOLDER --garment male_casualsuit04 --out dressed.h5",
+      run_import);
   ImportOptions& options = given.options;
   MotionOptions& motion = options.motion;
   app.add_option(
          "--source,SOURCE", given.source,
          "data folder; recording (.bvh, .amc; also .xz); character (.glb, .gltf, .vrm, .vrma, "
          ".fbx); "
-         "AMASS motion or body model (.npz); scans (.ply, .obj, .pcd, .xyz, .csv, .npy, .npz, "
-         ".h5); or a folder of one kind")
+         "AMASS motion or body model (.npz); motion of a pose estimator (.npz, .npy, .pkl, .pt); "
+         "scans (.ply, .obj, .pcd, .xyz, .csv, .npy, .npz, "
+         ".h5); depth pictures (.png, .npz); or a folder of one kind")
       .required();
   app.add_option("--out", given.out, "file to write").required();
   app.add_option("--license", options.license, "licence of the files");
@@ -143,15 +151,30 @@ void add_data_import(Program& program, CommandOptions group) {
             "recordings and characters whose left and right are exchanged, scans of no person's "
             "size or shape, motions of a body model whose numbers look as if they were not metres "
             "and radians");
+  app.add_option("--layout", motion.layout,
+                 "joints without rotations: their order, such as smpl22, h36m17, coco17, coco133, "
+                 "mediapipe33, openpose25, kinect25, azure32 or humanml263 (default: the one that "
+                 "fits)");
   app.add_option("--asf", options.asf, "skeleton of .amc files (default: the one beside)");
   app.add_option("--clip", options.clip, "characters: this animation only (default: all)");
   app.add_option("--body-model", options.body_model,
-                 "SMPL, SMPL-H or SMPL-X model (.npz), or a folder of them: AMASS needs it");
+                 "SMPL, SMPL-H or SMPL-X model (.npz), or a folder of them: AMASS needs it, a "
+                 "pose estimator's motion then has the person's own skeleton");
+  app.add_option("--person", options.person,
+                 "of a file with several people's motions this one (default: all)");
   app.add_option("--betas", options.betas,
                  "people of a body model: NPZ or NPY files, or zeros for the mean person");
   app.add_option("--without", options.without,
                  "packed clips: leave out these, by name or by a part of the attribute 'source' "
                  "(the user in user/repository)");
+  app.add_option("--intrinsics", options.intrinsics,
+                 "depth pictures (folder of 16-bit PNG, .npz, .npy): FX,FY,CX,CY in pixels, or a "
+                 "file: text of 4 or 9 numbers, or the camera's JSON (default: the file's own)");
+  app.add_option("--depth-scale", options.depth_scale,
+                 "depth pictures: metres a unit (default: 0.001 for whole numbers, else 1)")
+      .check(positive);
+  app.add_flag("--keep-background", options.keep_background,
+               "depth pictures: floor, walls and furniture too (default: the person alone)");
   app.add_option("--garment", options.garment,
                  "data folder: dress the bodies (a file of body/clothes) (default: naked)");
 }

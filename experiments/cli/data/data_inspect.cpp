@@ -13,6 +13,7 @@
 #include "datasets/builtin/bodies.h"
 #include "datasets/doctor/shape.h"
 #include "datasets/importers/import.h"
+#include "datasets/readers/frames/hdf5_frames.h"
 #include "datasets/schema.h"
 #include "experiments/cli/commands.h"
 #include "experiments/cli/data/import_text.h"
@@ -205,6 +206,19 @@ class Imported {
   std::vector<ImportReport> reports_;
 };
 
+/// Clouds of others in HDF5, of which our own reader knows nothing.
+bool is_foreign_file(const std::string& path) {
+  std::error_code ignored;
+  if (!std::filesystem::is_regular_file(path, ignored) || !is_hdf5(path)) return false;
+  if (!is_foreign_hdf5(path)) return false;
+  try {
+    inspect(path);
+    return false;
+  } catch (const InputError&) {
+    return holds_clouds(path);
+  }
+}
+
 int run_inspect(const InspectOptions& options, const Common& common) {
   if (!options.plot.empty() && !options.plot.ends_with(".png"))
     throw InputError(options.plot, "names no picture", "end --plot in .png");
@@ -213,7 +227,8 @@ int run_inspect(const InspectOptions& options, const Common& common) {
     throw InputError(options.file, "is a folder that 'restage data build' made",
                      "inspect a file in it, or 'restage data verify' it");
   std::optional<Imported> imported;
-  if (is_importable(options.file)) imported.emplace(options, common);
+  if (is_importable(options.file) || is_foreign_file(options.file))
+    imported.emplace(options, common);
   const std::string& data = imported ? imported->path() : options.file;
   const Inspection found = inspect(data);
   std::vector<std::string> remarks;

@@ -18,13 +18,14 @@
 #include "datasets/importers/motions/bvh.h"
 #include "datasets/importers/rigs/gltf_character.h"
 #include "datasets/readers/clouds/mesh_io.h"
-#include "datasets/readers/clouds/precision.h"
 #include "datasets/readers/foreign_kinds.h"
 #include "datasets/readers/frames/frame_folder.h"
 #include "datasets/readers/frames/hdf5_frames.h"
 #include "datasets/schema.h"
 #include "experiments/cli/commands.h"
+#include "experiments/cli/doctor/doctor_people.h"
 #include "experiments/cli/doctor/doctor_report.h"
+#include "experiments/cli/perform/joint_source.h"
 #include "experiments/cli/perform/source_options.h"
 #include "nn/config/config.h"
 #include "nn/weights/safetensors.h"
@@ -38,7 +39,7 @@ struct Options {
   std::string path, picture, up, facing, bones;
   std::optional<std::string> fix;
   std::optional<double> scale, fps;
-  bool target = false, self = false;
+  bool target = false, self = false, people = false;
   uint64_t max_memory = kMaxMemory;
 };
 
@@ -99,46 +100,30 @@ Report examine_one(const std::string& kind, Mesh mesh, const Vec3& origin, const
   return out;
 }
 
-/// Points that were single precision far from the origin lie on a grid, where they are farthest.
-bool on_grid(const Points& points, const Vec3& origin) {
-  Eigen::Index axis = 0;
-  origin.cwiseAbs().maxCoeff(&axis);
-  const double step = rounding_step({Point::Constant(static_cast<float>(origin[axis]))});
-  return std::all_of(points.begin(), points.end(), [&](const Point& p) {
-    return std::remainder(static_cast<double>(p[axis]), step) == 0;
-  });
-}
-
-void judge_origin(Report& out) {
-  const Vec3& origin = out.subject.origin;
-  if (origin.isZero(0)) return;
-  Finding f{"origin", Weight::wrong, "", 1, "", "--fix moves it to the origin"};
-  f.what = format("lies around (%.7g %.7g %.7g), far from the origin", origin.x(), origin.y(),
-                  origin.z());
-  f.evidence = "retargeting works in single precision, which is too coarse there";
-  if (on_grid(out.subject.mesh->vertices, origin)) {
-    f.what += ", and was rounded to the coarse steps of single precision there";
-    f.fix = "export it again in double precision, or with an offset subtracted";
-  }
-  out.findings.push_back(f);
-}
-
 Report examine_mesh(const Options& options) {
   Vec3 origin;
-  size_t left_out = 0;
+  LeftOut left_out;
   Mesh mesh = read_mesh(options.path, left_out, origin);
   const char* kind = mesh.faces.empty() ? "cloud" : "mesh";
   Report out = examine_one(kind, std::move(mesh), origin, options);
-  judge_origin(out);
-  if (left_out > 0) out.findings.push_back(non_finite(left_out, "", options.target));
+  if (const auto far = far_from_origin(origin, out.subject.mesh->vertices))
+    out.findings.push_back(*far);
+  if (left_out.non_finite > 0)
+    out.findings.push_back(non_finite(left_out.non_finite, "", options.target));
+  if (left_out.faint > 0)
+    out.findings.push_back({"splats", Weight::note,
+                            counted(left_out.faint, "splat") + " of an opacity below a tenth", 1,
+                            "nobody sees them", "--fix leaves them out"});
   return out;
 }
 
 Report examine_sequence(const Options& options) {
   Report out("frames");
-  auto source = without_empty_frames(
-      open_frames(options.path, {.clip = "", .max_memory = options.max_memory}));
-  if (!source->next())
+  FrameOptions how{.clip = "", .max_memory = options.max_memory};
+  how.origin = far_origin(options.path, how);
+  auto source = without_empty_frames(open_frames(options.path, how));
+  const std::optional<Frame> first = source->next();
+  if (!first)
     throw InputError(options.path, "holds no frame with points", "give at least one cloud");
   source->rewind();
   Diagnosis d = examine_frames(*source, examine_options(options));
@@ -151,7 +136,8 @@ Report examine_sequence(const Options& options) {
   for (const std::string& remark : source->remarks())
     out.findings.push_back({"remark", Weight::note, remark, 1, "", ""});
   out.diagnosis = std::move(d);
-  out.subject = {options.path, std::nullopt, std::move(source), std::nullopt, ""};
+  out.subject = {options.path, std::nullopt, std::move(source), std::nullopt, "", how.origin};
+  if (const auto far = far_from_origin(how.origin, first->points)) out.findings.push_back(*far);
   return out;
 }
 
@@ -300,6 +286,18 @@ Report examine_weights(const Options& options) {
   return out;
 }
 
+/// One cloud or mesh, or a table of points that holds a whole recording.
+Report examine_any(const Options& options) {
+  const bool table = is_cloud_name(options.path) || may_be_cloud_name(options.path);
+  if (table &&
+      open_frames(
+          options.path,
+          {.clip = "", .max_memory = options.max_memory, .sequence = std::nullopt, .far = true})
+              ->frames() > 1)
+    return examine_sequence(options);
+  return examine_mesh(options);
+}
+
 struct Kind {
   const char* start;                 ///< first bytes of such a file; empty: any
   std::vector<std::string> endings;  ///< of its name; none: any
@@ -309,8 +307,8 @@ struct Kind {
 const Kind kKinds[] = {
     {"ply", {}, examine_mesh},
     {"",
-     {".ply", ".obj", ".pcd", ".xyz", ".xyzn", ".xyzrgb", ".pts", ".asc", ".txt", ".csv"},
-     examine_mesh},
+     {".ply", ".obj", ".pcd", ".xyz", ".xyzn", ".xyzrgb", ".pts", ".asc", ".txt", ".csv", ".bin"},
+     examine_any},
     {"", {".bvh", ".bvh.xz", ".amc", ".amc.xz"}, examine_recording},
     {"", {".glb", ".gltf", ".vrm", ".fbx"}, examine_character},
     {"", {".npz", ".npy"}, examine_sequence},
@@ -321,6 +319,7 @@ const Kind kKinds[] = {
 Report examine(const Options& options) {
   const std::string& path = options.path;
   std::error_code ignored;
+  refuse_joints(path);
   if (fs::is_directory(path, ignored)) return examine_folder(options);
   if (is_hdf5(path)) return examine_hdf5(options);
   refuse_foreign_content(path);
@@ -410,6 +409,17 @@ void check_effect(const Options& options, const Report& found) {
   refuse_if(!options.facing.empty() && !lengths, "--facing", kind + "--facing says nothing");
 }
 
+int run_people(const Options& options, const Common& common) {
+  if (options.target || !options.picture.empty() || !options.facing.empty() ||
+      !options.bones.empty())
+    throw InputError("", "--people follows people through clouds, of which this says nothing",
+                     "leave --as-target, --picture, --facing and --bones out");
+  refuse_joints(options.path);
+  SourceRecord how{.path = options.path, .fps = options.fps, .scale = options.scale.value_or(1)};
+  if (!options.up.empty()) how.up = options.up.substr(options.up[0] == '+' ? 1 : 0);
+  return run_doctor_people(how, options.fix, common);
+}
+
 int run_doctor(Options options, const Common& common) {
   options.max_memory = common.max_memory;
   if (options.self != options.path.empty())
@@ -424,6 +434,7 @@ int run_doctor(Options options, const Common& common) {
                        "give --self alone");
     return run_doctor_self(common);
   }
+  if (options.people) return run_people(options, common);
   if (options.fix) repair_kind(*options.fix);
   check_output(options.fix.value_or(""), {options.path, options.bones});
   check_output(options.picture, {options.path, options.bones});
@@ -466,6 +477,7 @@ void add_doctor(Program& program) {
                   "--fix mended/\n"
                   "restage doctor --source frames60/ --fps 60 --fix mended.h5\n"
                   "restage doctor hero.glb --as-target --bones names.yaml\n"
+                  "restage doctor two/ --people --fix apart.h5\n"
                   "restage doctor --self\n"
                   "exit code: 0 usable, 1 read but not usable as it is, 2 not readable",
                   run_doctor);
@@ -479,6 +491,8 @@ void add_doctor(Program& program) {
   app.add_option("--fix", options.fix,
                  "write it mended: X.ply or X.obj (one cloud or surface), X.h5 (a sequence), or a "
                  "folder of frames");
+  app.add_flag("--people", options.people,
+               "say who is in a sequence of clouds; with --fix X.h5 write a sequence of each");
   app.add_flag("--as-target", options.target, "it is meant as a target: in T-pose, facing +z")
       .formerly("--target");
   add_scale(app, options.scale, "metres per unit, where you know better", "found");

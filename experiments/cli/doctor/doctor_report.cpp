@@ -5,6 +5,7 @@
 
 #include "autograd/base/error.h"
 #include "autograd/base/format.h"
+#include "datasets/readers/clouds/precision.h"
 #include "infer/render/figures.h"
 
 namespace restage::cli {
@@ -62,6 +63,16 @@ FigureLayer marks(const FigureLayer& person, const Diagnosis& d) {
       append(out.points, dotted({middle, 0.01f, front}, {middle + aside, 0.01f, front - 0.12f}));
   }
   return out;
+}
+
+/// Points that were single precision far from the origin lie on a grid, where they are farthest.
+bool on_grid(const Points& points, const Vec3& origin) {
+  Eigen::Index axis = 0;
+  origin.cwiseAbs().maxCoeff(&axis);
+  const double step = rounding_step({Point::Constant(static_cast<float>(origin[axis]))});
+  return std::all_of(points.begin(), points.end(), [&](const Point& p) {
+    return std::remainder(static_cast<double>(p[axis]), step) == 0;
+  });
 }
 
 }  // namespace
@@ -156,6 +167,19 @@ std::string picture_of(const std::string& out, const std::string& title, const M
     options.lines.push_back(std::string(name(f.weight)) + ": " + f.topic + ": " + f.what +
                             (f.weight != Weight::fact && !f.fix.empty() ? " -> " + f.fix : ""));
   return png_bytes(figure_sheet(figures, options));
+}
+
+std::optional<Finding> far_from_origin(const Vec3& origin, const Points& points) {
+  if (origin.isZero(0)) return std::nullopt;
+  Finding f{"origin", Weight::wrong, "", 1, "", "--fix moves it to the origin"};
+  f.what = format("lies around (%.7g %.7g %.7g), far from the origin", origin.x(), origin.y(),
+                  origin.z());
+  f.evidence = "retargeting works in single precision, which is too coarse there";
+  if (on_grid(points, origin)) {
+    f.what += ", and was rounded to the coarse steps of single precision there";
+    f.fix = "export it again in double precision, or with an offset subtracted";
+  }
+  return f;
 }
 
 }  // namespace restage::cli

@@ -23,6 +23,10 @@ std::string to_text(const Finding& finding);
 std::string to_text(const Similarity& transform, const std::string& of);
 std::string to_text(const Repaired& repaired);
 
+/// Of what lies far from the origin: `origin` was taken off the file's coordinates, of which
+/// `points` are left, those of the first frame. Nothing if it is zero.
+std::optional<Finding> far_from_origin(const Vec3& origin, const Points& points);
+
 /// Front, side and top of what was found, brought into our frame, and as it is: the person blue,
 /// stray points red, somebody or something else orange, marks for floor, height and facing. The
 /// bytes of a PNG file that is to be called `out`.

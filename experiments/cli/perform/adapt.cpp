@@ -5,6 +5,7 @@
 #include "autograd/base/output_check.h"
 #include "experiments/cli/commands.h"
 #include "experiments/cli/output.h"
+#include "experiments/cli/perform/joint_source.h"
 #include "experiments/cli/perform/source_options.h"
 #include "experiments/cli/perform/standard_weights.h"
 #include "experiments/slow_work.h"
@@ -36,6 +37,7 @@ void check(const AdaptCommand& c) {
   in("--batch", static_cast<double>(o.batch), 1, 1024);
   in("--min-confidence", o.min_confidence, 0, 1);
   in("--held-out", o.held_out, 0.05, 0.9);
+  for (const std::string& source : c.sources) refuse_joints(source);
   std::vector<std::string> inputs = c.sources;
   inputs.push_back(c.weights);
   check_output(c.out, inputs);

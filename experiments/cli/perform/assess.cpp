@@ -9,6 +9,7 @@
 #include "experiments/adapt/assess.h"
 #include "experiments/cli/commands.h"
 #include "experiments/cli/output.h"
+#include "experiments/cli/perform/joint_source.h"
 #include "experiments/cli/perform/source_options.h"
 #include "experiments/cli/perform/standard_weights.h"
 #include "experiments/slow_work.h"
@@ -145,6 +146,7 @@ int run_assess(const AssessCommand& c, const Common& common) {
     throw InputError("", "--samples is out of range", "give a number from 1 to 256");
   const std::string weights = c.weights.empty() ? standard_weights() : c.weights;
   const Bundle models = load_bundle(weights);
+  refuse_joints(c.source.path);
   Source source(c.source, common.max_memory);
   if (source.frames() == 0)
     throw InputError(c.source.path, "holds no frames", "give at least one cloud");

@@ -64,22 +64,13 @@ void log_profile(const Profile& profile) {
       format("peak of tensors %.1f MiB", static_cast<double>(memory_stats().peak) / 1048576.0));
 }
 
-Joints rest_joints(const std::string& path) {
-  const Prediction rest = read_prediction(path);
-  if (rest.joints.empty() || rest.frames != 1)
-    throw InputError(path + ":/joints", "is not one skeleton",
-                     "give the target's rest joints as [1, 22, 3]");
-  Joints out;
-  for (size_t j = 0; j < out.size(); ++j) out[j] = Eigen::Map<const Vec3>(&rest.joints[3 * j]);
-  return out;
-}
-
 /// What has become of the source.
 struct Outcome {
   Frames filled;  ///< RetargetedFrame::filled
   int64_t frames = 0, held = 0;
   size_t points_left_out = 0;
   std::vector<double> confidence, sure;  ///< of all frames; of those that a cloud is behind
+  SparseWatch sparse;
 };
 
 /// All frames of the source through the system and into the sink, which is not committed.
@@ -144,6 +135,7 @@ class Run {
       return;
     }
     gaps_.end();
+    out_.sparse.add(points);
     const double work = seconds_since(start);
     const FrameTimes times = system_.times();
     profile_.add({read_, times.extract, times.motion, times.deformation, written, read_ + work});
@@ -196,6 +188,7 @@ void log_outcome(const std::string& name, const Outcome& done, const Source& sou
                 " points of the source are NaN or infinite, or more than 5 m from the middle "
                 "of the others, and were left out");
   warn_if_unsure(name, done.sure);
+  if (!done.sure.empty()) done.sparse.warn(name);
 }
 
 Retargeted told(const RetargetCommand& c, const Common& common, const Source& source,
@@ -218,8 +211,15 @@ Retargeted told(const RetargetCommand& c, const Common& common, const Source& so
 }
 
 Source open_source(const RetargetCommand& c, const Common& common, RetargetCaller& caller) {
-  if (caller.clouds) return Source(c.source, std::move(caller.clouds));
-  return Source(c.source, common.max_memory);
+  SourceRecord how = c.source;
+  if (!c.person.empty()) {
+    int64_t number = -1;
+    if (!text::parse(std::string_view(c.person), number) || number < 0)
+      throw InputError("", "--person of clouds is a number from 0", "give one");
+    how.person = number;
+  }
+  if (caller.clouds) return Source(how, std::move(caller.clouds));
+  return Source(how, common.max_memory);
 }
 
 int run_retarget(const RetargetCommand& c, const Common& common) {
@@ -233,17 +233,6 @@ std::string help_of_systems() {
       systems(), [](const SystemType& type) { return type.name + ": " + type.help; }, "; ");
 }
 
-/// The joints that the system gives: those of its networks and of --rest. InputError if they have
-/// two.
-JointDefinition joints_given(const RetargetCommand& c, const SystemInput& input) {
-  std::vector<NamedDefinition> said{
-      {joint_definition(input.weights.only(with_late(system_type(c.system).roles)),
-                        input.weights_name),
-       input.weights_name}};
-  if (!c.rest.empty()) said.push_back({PredictionReader(c.rest).read_small().definition, c.rest});
-  return common_definition(said);
-}
-
 }  // namespace
 
 Retargeted retarget(const RetargetCommand& c, const Common& common, RetargetCaller caller) {
@@ -252,9 +241,9 @@ Retargeted retarget(const RetargetCommand& c, const Common& common, RetargetCall
   std::string no_skeleton;
   if (!from_memory && !c.from_surface && has_take(c, &no_skeleton))
     return run_take(c, common, caller);
-  if (!c.source_bones.empty() || !c.body_model.empty() || !c.asf.empty())
+  if (!c.source_bones.empty() || !c.body_model.empty() || !c.asf.empty() || !c.layout.empty())
     throw InputError(c.source.path, "is looked at as a surface, which has no skeleton",
-                     "leave --source-bones, --body-model and --asf out");
+                     "leave --source-bones, --body-model, --layout and --asf out");
   SystemInput input = load_input(c, common);
   Source source = open_source(c, common, caller);
   if (source.frames() == 0)
@@ -293,6 +282,16 @@ void add_target_options(CommandOptions app, RetargetCommand& c) {
       "--bones", c.bones,
       "which bone of a glTF target is which joint, a .yaml file or a known family (default: "
       "found)");
+}
+
+void add_animation_options(CommandOptions app, SinkOptions& to) {
+  app.add_option("--clip-name", to.clip_name,
+                 "of the animation that a rigged target's file gets (default: the source's name)");
+  app.add_option("--skeleton", to.skeleton,
+                 "names and axes of the bones that a target without a rig gets: restage, smpl, "
+                 "mixamo, vrm, unreal (default: restage)");
+  app.add_flag("--animation-only", to.animation_only,
+               "of a rigged target only nodes and the animation, without meshes");
 }
 
 void add_system_options(CommandOptions app, RetargetCommand& c) {
@@ -356,6 +355,9 @@ void add_retarget(Program& program) {
       "--animation-only --out dance.glb\n"
       "restage retarget --source walk_poses.npz --body-model smplh/ --target hero.glb --out-fps 24 "
       "--out hero_walking.glb\n"
+      "restage retarget --source wham_output.pkl --person 3 --target hero.glb --out hero_seen.glb\n"
+      "restage retarget --source joints.npy --layout h36m17 --fps 50 --target hero.glb --out "
+      "a.glb\n"
       "restage retarget --source 02_03.amc --asf 02.asf --target hero.vrm --out hero_running.vrma\n"
       "restage retarget --source scans/ --target hero.obj --skeleton mixamo --out hero.glb\n"
       "restage retarget --source scans.h5 --target hero.ply --weights runs/demo-1 --out result.h5\n"
@@ -389,30 +391,35 @@ void add_retarget_options(CommandOptions app, RetargetCommand& c, bool files) {
   Option source = app.add_option(
       "--source,SOURCE", c.source.path,
       "folder of clouds, file of them (HDF5, NPZ, NPY); or a skeleton's motion, which is taken "
-      "over exactly: BVH, AMC, glTF, VRM, VRMA, FBX, AMASS (.npz), our motions (.h5)");
+      "over exactly: BVH, AMC, glTF, VRM, VRMA, FBX, AMASS and pose estimators (.npz, .npy, .pkl, "
+      ".pt), our motions (.h5)");
   add_target_options(app, c);
   app.add_option("--source-bones", c.source_bones,
                  "the same of a source's skeleton (default: found)");
+  app.add_option(
+      "--layout", c.layout,
+      "of a source of joints without rotations, in which order they are: smpl22, h36m17, "
+      "coco17, coco133, mediapipe33, openpose25, kinect25, azure32, humanml263 or another "
+      "(default: the one that fits)");
   app.add_option("--asf", c.asf, "of an AMC source its skeleton (default: the one beside)");
   app.add_option("--body-model", c.body_model,
-                 "of an AMASS source its SMPL model (.npz), or a folder of them");
+                 "of an AMASS source or a pose estimator's its SMPL model (.npz), or a folder of "
+                 "them");
+  app.add_option(
+      "--person", c.person,
+      "of a source that shows several people this one: from 0, or as an estimator's file "
+      "calls it; in clouds they are counted from -x to +x in the first frame");
   add_weights_options(app, c);
   app.add_option("--every", c.to.every, "only every so many frames of the source; for X.h5");
   Option out = app.add_option(
       "--out,OUT", c.to.out,
       "X.glb, X.gltf, X.vrm, X.vrma, X.bvh, X.h5, or a folder for PLY or OBJ frames");
   if (files) source.required(), out.required();
-  app.add_option("--clip-name", c.to.clip_name,
-                 "of the animation that a rigged target's file gets (default: the source's name)");
+  add_animation_options(app, c.to);
   app.add_option("--out-fps", c.to.fps, "frames per second of an animation, such as 24 or 60");
   app.add_option("--joints", c.to.joints,
                  "for X.h5: convert /joints to this definition, smpl or makehuman (default: the "
                  "weights' own)");
-  app.add_option("--skeleton", c.to.skeleton,
-                 "names and axes of the bones that a target without a rig gets: restage, smpl, "
-                 "mixamo, vrm, unreal (default: restage)");
-  app.add_flag("--animation-only", c.to.animation_only,
-               "of a rigged target only nodes and the animation, without meshes");
   add_source_options(app, c.source);
   app.add_option("--format", c.to.format,
                  "of a folder's frames: ply or obj (default: the target's own, else ply)");

@@ -16,7 +16,7 @@ namespace restage::cli {
 
 struct RetargetCommand {
   SourceRecord source;
-  std::string target, bones, source_bones, body_model, asf, weights, device = "cpu";
+  std::string target, bones, source_bones, body_model, person, asf, layout, weights, device = "cpu";
   std::string system = "chain", rest;
   SinkOptions to;
   RetargetOptions options;
@@ -50,6 +50,8 @@ void add_retarget_options(CommandOptions app, RetargetCommand& c, bool files = t
 void add_target_options(CommandOptions app, RetargetCommand& c);
 void add_weights_options(CommandOptions app, RetargetCommand& c);
 void add_system_options(CommandOptions app, RetargetCommand& c);
+/// What the animation in a result is called, whose bones it moves, and whether meshes are left out.
+void add_animation_options(CommandOptions app, SinkOptions& to);
 /// All of these, and how clouds that come one by one are read: what makes a system that somebody
 /// else feeds (python/). It answers at once, unless --no-online lets its network look ahead.
 void add_live_options(CommandOptions app, RetargetCommand& c);

@@ -12,6 +12,27 @@
 namespace restage::cli {
 namespace {
 
+Joints rest_joints(const std::string& path) {
+  const Prediction rest = read_prediction(path);
+  if (rest.joints.empty() || rest.frames != 1)
+    throw InputError(path + ":/joints", "is not one skeleton",
+                     "give the target's rest joints as [1, 22, 3]");
+  Joints out;
+  for (size_t j = 0; j < out.size(); ++j) out[j] = Eigen::Map<const Vec3>(&rest.joints[3 * j]);
+  return out;
+}
+
+/// The joints that the system gives: those of its networks and of --rest. InputError if they have
+/// two.
+JointDefinition joints_given(const RetargetCommand& c, const SystemInput& input) {
+  std::vector<NamedDefinition> said{
+      {joint_definition(input.weights.only(with_late(system_type(c.system).roles)),
+                        input.weights_name),
+       input.weights_name}};
+  if (!c.rest.empty()) said.push_back({PredictionReader(c.rest).read_small().definition, c.rest});
+  return common_definition(said);
+}
+
 /// A target that is refused as it stands may only lack the names of its bones: then that is what
 /// there is to mend.
 template <class Work>

@@ -1,7 +1,11 @@
 // restage retarget of a source that has a skeleton: BVH, AMC, glTF, VRM animations, AMASS, motions.
+#include <filesystem>
+
 #include "autograd/base/log.h"
 #include "datasets/benchmark/floor.h"
 #include "datasets/doctor/examine.h"
+#include "datasets/importers/joints/joint_file.h"
+#include "datasets/importers/motions/estimated.h"
 #include "datasets/importers/motions/skeleton_take.h"
 #include "datasets/readers/errors.h"
 #include "datasets/readers/text/text.h"
@@ -25,6 +29,10 @@ void check_words(const RetargetCommand& c) {
                      "leave " + option + " out, or add --from-surface");
   };
   const bool many = text::ends_in(c.source.path, {".h5", ".hdf5"});
+  if (c.source.fps && !(*c.source.fps >= 1 && *c.source.fps <= 2000))
+    throw InputError("", "--fps is out of range", "give the source's frames per second, 1 to 2000");
+  if (!(c.source.scale >= 1e-9 && c.source.scale <= 1e9))
+    throw InputError("", "--scale is out of range", "give metres per unit of the source");
   if (c.source.sequence && !many) refuse("--sequence");
   if (c.system != "chain") refuse("--system");
   if (c.options.samples != usual.samples) refuse("--samples");
@@ -35,8 +43,13 @@ void check_words(const RetargetCommand& c) {
   if (!c.options.late) refuse("--online");
   if (!c.options.keep_limbs) refuse("--no-keep-limbs");
   if (c.profile) refuse("--profile");
-  if (!c.body_model.empty() && !text::ends_in(c.source.path, {".npz"}))
+  const bool parameters = may_hold_estimates(c.source.path);
+  if (!c.body_model.empty() && !parameters)
     throw InputError(c.source.path, "has a skeleton of its own", "leave --body-model out");
+  std::error_code ignored;
+  if (!c.person.empty() && !parameters && !may_hold_joints(c.source.path) &&
+      !std::filesystem::is_directory(c.source.path, ignored))
+    throw InputError(c.source.path, "has one skeleton", "leave --person out");
   if (!c.asf.empty() && !text::ends_in(c.source.path, {".amc", ".amc.xz"}))
     throw InputError(c.source.path, "has a skeleton of its own", "leave --asf out");
   if (many && c.source.fps && *c.source.fps != kFps)
@@ -59,36 +72,19 @@ void check_no_network(const RetargetCommand& c) {
                        cat("leave ", option, " out, or add --from-surface"));
 }
 
-/// Readers name the options of `data import`; those of a source are called otherwise here.
-template <class Work>
-auto as_source(const Work& work) {
-  try {
-    return work();
-  } catch (const InputError& error) {
-    const auto ours = [](std::string text) {
-      for (const std::string option : {"--bones", "--up"}) {
-        const std::string other = "--source" + option.substr(1);
-        for (size_t at = text.find(option); at != std::string::npos;
-             at = text.find(option, at + other.size()))
-          text.replace(at, option.size(), other);
-      }
-      return text;
-    };
-    throw InputError(error.where(), ours(error.cause()), ours(error.mend()));
-  }
-}
-
 TakeOptions options_of(const RetargetCommand& c, const Joints& performer) {
   TakeOptions out;
   if (c.source.scale != 1) out.motion.scale = c.source.scale;
-  if (c.source.up != "y") out.motion.rest.up = parse_axis(c.source.up, "--source-up");
+  if (c.source.up_known) out.motion.rest.up = parse_axis(c.source.up, "--source-up");
   if (c.source.fps) out.motion.fps = *c.source.fps;
   out.motion.force = c.options.force;
   out.motion.profile = c.source_bones;
   out.motion.fingers = true;
+  out.motion.layout = c.layout;
   out.clip = c.source.clip;
   out.sequence = c.source.sequence;
   out.body_model = c.body_model;
+  out.person = c.person;
   out.asf = c.asf;
   out.like = performer;
   return out;
@@ -106,8 +102,9 @@ double unlike(const SkeletonTake& take, const Joints& rest, const std::vector<si
 }
 constexpr double kSame = 0.01;
 
-/// Keeps the feet of a target above the floor that performs another's motion: before a foot would
-/// go below it, the foot is raised, and later let down. What a knee cannot give, the pelvis does.
+/// Keeps the feet of a target on the floor that performs another's motion: before a foot would go
+/// below it, the foot is raised, and later let down; one that floats while the source's is near the
+/// floor is lowered. What a knee cannot give, the pelvis does.
 class Floor {
  public:
   Floor(const SkeletonTake& take, const Shown& shown)
@@ -122,34 +119,45 @@ class Floor {
   /// Looks at the whole take.
   void prepare() {
     const FlatFoot flat = flat_foot(take_.rest);
-    std::array<std::vector<double>, 2> lifts;
+    std::array<std::vector<double>, 2> lifts, drops;
     std::vector<double> raised;
     for (size_t f = 0; f < take_.frames.size(); ++f) {
       const Pose pose = perform_take(take_, f, rest_);
       const auto deep =
           depths(least_heights(take_.frames[f].joints, flat, scale_), soles_, rest_, pose);
+      const auto high = floating(take_.frames[f].joints, flat, scale_, soles_, rest_, pose);
       raised.push_back(0);
       for (int side = 0; side < 2; ++side) {
         const double by = deep[static_cast<size_t>(side)], most = most_lift(rest_, side, pose);
         lifts[static_cast<size_t>(side)].push_back(std::min(by, most));
+        drops[static_cast<size_t>(side)].push_back(
+            std::min(high[static_cast<size_t>(side)], most_drop(rest_, side, pose)));
         raised.back() = std::max(raised.back(), by - most);
       }
     }
     raised_ = smooth_over(std::move(raised));
-    for (size_t side = 0; side < 2; ++side) lifts_[side] = smooth_over(std::move(lifts[side]));
+    for (size_t side = 0; side < 2; ++side) {
+      lifts_[side] = smooth_over(std::move(lifts[side]));
+      const std::vector<double> drop = lower_envelope(drops[side], kHalf);
+      for (size_t f = 0; f < drop.size(); ++f) lifts_[side][f] -= std::max(0.0, drop[f]);
+    }
   }
 
   void operator()(size_t frame, Pose* pose) const {
     pose->root.y() += raised_[frame];
-    raise_feet({std::max(0.0, lifts_[0][frame] - raised_[frame]),
-                std::max(0.0, lifts_[1][frame] - raised_[frame])},
-               rest_, pose);
+    std::array<double, 2> by;
+    for (size_t side = 0; side < 2; ++side) {
+      const double lift = lifts_[side][frame];
+      by[side] = lift > 0 ? std::max(0.0, lift - raised_[frame]) : lift - raised_[frame];
+    }
+    raise_feet(by, rest_, pose);
   }
 
  private:
+  static constexpr size_t kHalf = 2;  // frames
+
   /// A smooth curve on or above the values.
   static std::vector<double> smooth_over(std::vector<double> values) {
-    constexpr size_t kHalf = 2;  // frames
     for (double& x : values) x = -x;
     std::vector<double> out = lower_envelope(values, kHalf);
     for (double& x : out) x = -x;
@@ -188,9 +196,13 @@ class Hands {
     for (size_t f = 0; f < poses.size(); ++f)
       exact.push_back(contacts_.moves({theirs_, take_.frames[f], size_}, rest_, poses[f]));
     moves_ = smoothed(exact);
+    for (size_t f = 0; f < poses.size(); ++f) exact[f] = elbows_moved(rest_, moves_[f], poses[f]);
+    elbows_ = smoothed(exact);
   }
 
-  void operator()(size_t frame, Pose* pose) const { move_hands(rest_, moves_[frame], pose); }
+  void operator()(size_t frame, Pose* pose) const {
+    move_hands(rest_, moves_[frame], elbows_[frame], pose);
+  }
 
  private:
   /// A bell over the frames around.
@@ -217,13 +229,13 @@ class Hands {
   Contacts contacts_;
   PartSurfaces theirs_;
   double size_;
-  std::vector<std::array<Vec3, 2>> moves_;
+  std::vector<std::array<Vec3, 2>> moves_, elbows_;
 };
 
 }  // namespace
 
 bool has_take(const RetargetCommand& c, std::string* why) {
-  return as_source([&] { return holds_take(c.source.path, c.source_bones, why); });
+  return as_source([&] { return holds_take(c.source.path, c.source_bones, why, c.layout); });
 }
 
 Retargeted run_take(const RetargetCommand& c, const Common& common, const RetargetCaller& caller) {
@@ -243,6 +255,7 @@ Retargeted run_take(const RetargetCommand& c, const Common& common, const Retarg
   if (target.own) weights = target.own->weights();
   const Joints& rest = target.own ? target.own->rest() : *system->target_joints();
   SkeletonTake take = as_source([&] { return read_take(c.source.path, options_of(c, rest)); });
+  for (std::string& remark : take.report.remarks) remark = source_words(std::move(remark));
   put_on_floor(take, rest);
   std::optional<SystemRig> rig;
   if (target.own) rig.emplace(SystemRig{rest, weights});

@@ -4,7 +4,9 @@
 
 #include "autograd/base/format.h"
 #include "autograd/base/log.h"
+#include "datasets/doctor/shape.h"
 #include "datasets/readers/errors.h"
+#include "nn/models/extraction.h"
 
 namespace restage::cli {
 namespace {
@@ -58,6 +60,19 @@ void say_take(const SkeletonTake& take) {
   line += cat(line.empty() ? "" : ", ", take.name, ": ", take.frames.size(),
               " frames at 30 a second", take.fingers.empty() ? "" : ", with fingers");
   say(line, take.report);
+  if (fact(take.report, "joints").empty()) return;  // of joints, what was found is in doubt
+  for (const auto& [name, value] : take.report.facts)
+    log_info(take.report.file + ": " + name + ": " + value);
+}
+
+std::string source_words(std::string text) {
+  for (const std::string option : {"--bones", "--up"}) {
+    const std::string other = "--source" + option.substr(1);
+    for (size_t at = text.find(option); at != std::string::npos;
+         at = text.find(option, at + other.size()))
+      text.replace(at, option.size(), other);
+  }
+  return text;
 }
 
 void warn_if_unsure(const std::string& source, std::vector<double> confidence) {
@@ -76,6 +91,23 @@ void warn_if_unsure(const std::string& source, std::vector<double> confidence) {
     log_warning(source + format(": in %lld frames nobody can be made out (confidence below %.2f); "
                                 "see what 'restage doctor' says of it",
                                 static_cast<long long>(lost), kLost));
+}
+
+void SparseWatch::add(const Points& cloud) {
+  constexpr size_t kSurelyEnough = 10 * kEnoughToTrust;  // no need to look for repeats
+  counts_.push_back(cloud.size() > kSurelyEnough ? cloud.size() : distinct(cloud).size());
+}
+
+void SparseWatch::warn(const std::string& source) const {
+  if (counts_.empty()) return;
+  std::vector<size_t> counts = counts_;
+  const auto middle = counts.begin() + std::ssize(counts) / 2;
+  std::nth_element(counts.begin(), middle, counts.end());
+  if (*middle < kEnoughToTrust)
+    log_warning(cat(source, ": with ", *middle,
+                    " points a frame (median) the confidence promises too much: of clouds "
+                    "that show one side it can be trusted from ",
+                    kEnoughToTrust, " points on (docs/real_scans.md, Sparse clouds)"));
 }
 
 }  // namespace restage::cli

@@ -12,6 +12,7 @@
 #include "datasets/schema.h"
 #include "experiments/cli/commands.h"
 #include "experiments/cli/output.h"
+#include "experiments/cli/perform/joint_source.h"
 #include "experiments/cli/perform/retarget_words.h"
 #include "experiments/cli/perform/standard_weights.h"
 #include "experiments/source.h"
@@ -121,6 +122,7 @@ int run_skeleton(const SkeletonOptions& given, const Common& common) {
     convert.emplace(definition, options.joints, options.weights);
     definition = options.joints;
   }
+  refuse_joints(options.source);
   const auto frames = open_frames(
       options.source, {.clip = "", .max_memory = common.max_memory, .sequence = options.sequence});
   check_one_sequence(options.source, frames->sequences(), options.sequence);
@@ -133,6 +135,7 @@ int run_skeleton(const SkeletonOptions& given, const Common& common) {
   JointExtractor extract(model, {.samples = options.samples, .any_size = true, .any_way_up = true});
   size_t left_out = 0;
   std::vector<double> sure;
+  SparseWatch sparse;
   int64_t seen_frames = 0, empty = 0;
   while (const auto frame = frames->next()) {
     throw_if_stopped();
@@ -148,6 +151,7 @@ int run_skeleton(const SkeletonOptions& given, const Common& common) {
     left_out += frame->left_out;
     SeenJoints seen = extract(frame->points, frame->source, key);
     if (seen.uncertainty) sure.push_back(confidence(*seen.uncertainty));
+    sparse.add(frame->points);
     if (convert) seen.joints = (*convert)(seen.joints);
     const auto radius = radius_of(seen);
     if (file) file->add(seen.joints, radius);
@@ -169,6 +173,7 @@ int run_skeleton(const SkeletonOptions& given, const Common& common) {
   if (left_out > 0)
     log_info(options.source + ": left out " + counted(left_out, "point") +
              " whose coordinates are NaN or infinite");
+  if (!sure.empty()) sparse.warn(options.source);
   warn_if_unsure(options.source, std::move(sure));
   if (common.json) {
     Json document = {{"frames", list}, {"seed", common.seed}};

@@ -14,239 +14,102 @@
 #include "experiments/cli/output.h"
 #include "experiments/cli/perform/source_options.h"
 #include "experiments/cli/pictures/browser.h"
+#include "experiments/cli/pictures/view_options.h"
 #include "experiments/pictures/rows.h"
+#include "experiments/pictures/two_takes.h"
 #include "experiments/pictures/view.h"
 #include "experiments/slow_work.h"
 #include "infer/render/animation.h"
 #include "infer/render/film.h"
 #include "infer/render/page.h"
 #include "infer/render/sheet.h"
+#include "infer/render/side_by_side.h"
 
 namespace restage::cli {
 namespace {
 
-constexpr int kPictureHeight = 720, kAnimationHeight = 480, kLeastSide = 16, kMostSide = 4096;
+constexpr int kPictureHeight = 720, kAnimationHeight = 480;
 constexpr double kUsualGifFps = 15;
 
-constexpr const char* kRemembered = "source";
-
-struct ViewOptions {
-  ShowRequest request;
-  std::string out, size, side, background, title;
-  std::string compare;  ///< a path, or kRemembered
-  Comparison beside;
-  std::optional<double> fps, zoom, azimuth;
-  std::optional<int64_t> every, columns;
-
-  bool rows = false;  ///< also where nothing is beside the file (render)
-
-  bool compares() const { return rows || !compare.empty() || !beside.truth.empty(); }
-};
-
-enum class ViewKind { picture, sheet, webp, gif, page };
-
-ViewKind kind_of(const ViewOptions& o) {
-  const auto ends = [&](const char* ending) { return o.out.ends_with(ending); };
-  if (o.out.empty() || ends(".html")) return ViewKind::page;
-  if (ends(".png")) return o.compares() || o.columns ? ViewKind::sheet : ViewKind::picture;
-  if (ends(".webp")) return ViewKind::webp;
-  if (ends(".gif")) return ViewKind::gif;
-  throw InputError(o.out, "names no picture, animation or page",
-                   "end --out in .png, .webp, .gif or .html");
-}
-
-bool is_animation(ViewKind kind) { return kind == ViewKind::webp || kind == ViewKind::gif; }
-
-/// Degrees from the front towards the body's left.
-double azimuth_of(const ViewOptions& o) {
-  if (o.azimuth) return *o.azimuth;
-  if (o.side == "front") return 0;
-  if (o.side == "left") return 90;
-  if (o.side == "right") return -90;
-  return o.side == "back" ? 180 : 32;
-}
-
-/// "640x480" as width and height.
-std::pair<int, int> parse_size(const std::string& text) {
-  int width = 0, height = 0, end = 0;
-  const int read = std::sscanf(text.c_str(), "%5dx%5d%n", &width, &height, &end);
-  if (read == 2 && static_cast<size_t>(end) == text.size() &&
-      std::min(width, height) >= kLeastSide && std::max(width, height) <= kMostSide)
-    return {width, height};
-  throw InputError("", "--size '" + text.substr(0, 40) + "' is no size",
-                   format("give WIDTHxHEIGHT in pixels, each %d to %d", kLeastSide, kMostSide));
-}
-
-Rgb parse_colour(const std::string& text) {
-  if (text == "white") return {255, 255, 255};
-  if (text == "black") return {0, 0, 0};
-  if (text == "grey" || text == "gray") return {128, 128, 128};
-  const std::string digits = text.starts_with('#') ? text.substr(1) : text;
-  if (digits.size() == 6 &&
-      digits.find_first_not_of("0123456789abcdefABCDEF") == std::string::npos) {
-    const auto number = static_cast<uint32_t>(std::strtoul(digits.c_str(), nullptr, 16));
-    return {static_cast<uint8_t>(number >> 16), static_cast<uint8_t>(number >> 8 & 255),
-            static_cast<uint8_t>(number & 255)};
-  }
-  throw InputError("", "--background '" + text.substr(0, 40) + "' is no colour",
-                   "give white, black, grey or six digits such as '#e8f0ff'");
-}
-
-using Given = std::initializer_list<std::pair<bool, const char*>>;
-
-/// The options of `list` that are given, and why they are refused.
-void refuse(const Given& list, const char* why) {
-  for (const auto& [given, name] : list)
-    if (given) throw InputError("", std::string(name) + " " + why, "leave it out");
-}
-
-/// Options that the kind of picture has no use for.
-void check_kind(const ViewOptions& o, ViewKind kind) {
-  const ShowRequest& r = o.request;
-  if (kind == ViewKind::page)
-    refuse({{!o.size.empty(), "--size"},
-            {!o.side.empty(), "--side"},
-            {o.azimuth.has_value(), "--azimuth"},
-            {!r.look.part.empty(), "--look"},
-            {o.zoom.has_value(), "--zoom"},
-            {!o.background.empty(), "--background"},
-            {o.columns.has_value(), "--columns"}},
-           "is for pictures, such as a sheet: a page is turned and zoomed by hand");
-  if (kind == ViewKind::sheet)
-    refuse({{!o.size.empty(), "--size"},
-            {o.zoom.has_value(), "--zoom"},
-            {!o.background.empty(), "--background"}},
-           "is for a picture of one moment, not for a sheet of several");
-  if (kind != ViewKind::picture)
-    refuse({{r.frame.has_value(), "--frame"}, {r.seconds.has_value(), "--time"}},
-           "is for one picture (.png), not for an animation or a sheet");
-  else
-    refuse({{o.every.has_value(), "--every"}, {!o.title.empty(), "--title"}},
-           "is not for a picture of one moment");
-  if (is_animation(kind))
-    refuse({{!o.compare.empty(), "--compare"},
-            {!o.beside.truth.empty(), "--truth"},
-            {o.columns.has_value(), "--columns"},
-            {!o.title.empty(), "--title"}},
-           "is not for an animation: end --out in .png");
-}
-
-/// Options that belong to others which are not there.
-void check_together(const ViewOptions& o) {
-  const ShowRequest& r = o.request;
-  const Comparison& c = o.beside;
-  refuse({{r.frame && r.seconds, "--frame"}}, "contradicts --time");
-  refuse({{!o.side.empty() && o.azimuth, "--side"}}, "contradicts --azimuth");
-  refuse({{r.look.within && r.look.part.empty(), "--within"}}, "belongs to --look");
-  if (o.compares())
-    refuse({{o.fps.has_value(), "--fps"},
-            {o.every.has_value(), "--every"},
-            {!r.bones.empty(), "--bones"}},
-           "does not go with --compare and --truth");
-  else
-    refuse({{c.fps.has_value(), "--source-fps"},
-            {c.scale.has_value(), "--source-scale"},
-            {c.up.has_value(), "--source-up"},
-            {c.clip.has_value(), "--source-clip"},
-            {c.sequence.has_value(), "--source-sequence"}},
-           "says how the file of --compare is read, and there is none");
-}
-
-void check_ranges(const ViewOptions& o, ViewKind kind) {
-  const ShowRequest& r = o.request;
-  const auto within = [](const char* name, const std::optional<double>& value, double least,
-                         double most, const char* what) {
-    if (value && !(*value >= least && *value <= most))
-      throw InputError("", std::string(name) + " is out of range",
-                       format("give %s, %g to %g", what, least, most));
-  };
-  const char* rate = "frames per second";
-  within("--fps", o.fps, 1, kind == ViewKind::gif ? kGifFps : 240, rate);
-  within("--source-fps", o.beside.fps, 1, 1000, rate);
-  within("--zoom", o.zoom, 0.1, 50, "a factor");
-  within("--scale", r.scale, 1e-9, 1e6, "metres per unit");
-  within("--source-scale", o.beside.scale, 1e-9, 1e6, "metres per unit");
-  within("--within", r.look.within, 1e-3, 10, "metres");
-  within("--azimuth", o.azimuth, -360, 360, "degrees");
-  if (o.every && !(*o.every >= 1 && *o.every <= 100'000))
-    throw InputError("", "--every is out of range", "give a whole number, 1 to 100000");
-  if (o.columns && !(*o.columns >= 1 && *o.columns <= 64))
-    throw InputError("", "--columns " + std::to_string(*o.columns) + " is out of range",
-                     "give a number from 1 to 64");
-  if (!o.size.empty()) parse_size(o.size);
-  if (!o.background.empty()) parse_colour(o.background);
-  check_look(r.look);
-}
-
-FilmOptions film_options(const ViewOptions& o, const Showing& view, ViewKind kind) {
+FilmOptions film_options(const ViewOptions& o, double facing, double close_up, ViewKind kind) {
   FilmOptions out;
   out.height = kind == ViewKind::picture ? kPictureHeight : kAnimationHeight;
   if (!o.size.empty()) std::tie(out.width, out.height) = parse_size(o.size);
   if (!o.background.empty()) out.background = parse_colour(o.background);
-  out.azimuth = view.facing + azimuth_of(o);
+  out.azimuth = facing + azimuth_of(o);
   out.zoom = o.zoom.value_or(1);
-  out.close_up = view.close_up;
+  out.close_up = close_up;
   return out;
 }
 
-std::vector<size_t> all_frames(const Clip& clip, size_t every) {
+std::vector<size_t> all_frames(size_t frames, size_t every = 1) {
   std::vector<size_t> out;
-  for (size_t f = 0; f < clip.frames.size(); f += every) out.push_back(f);
+  for (size_t f = 0; f < frames; f += every) out.push_back(f);
   return out;
 }
 
-/// The file's bytes, and the size of its pictures.
-std::string animation(const Film& film, const Clip& clip, ViewKind kind) {
+/// The file's bytes. Drawn: a Film or SideBySide of so many frames.
+template <class Drawn>
+std::string animation(const Drawn& film, size_t frames, double fps, ViewKind kind) {
   std::unique_ptr<AnimationWriter> writer;
   if (kind == ViewKind::webp) {
-    writer = webp_writer(clip.fps);
+    writer = webp_writer(fps);
   } else {
     constexpr size_t kSamples = 6;
     std::vector<Image> samples;
-    film.draw(all_frames(clip, (clip.frames.size() + kSamples - 1) / kSamples),
+    film.draw(all_frames(frames, (frames + kSamples - 1) / kSamples),
               [&](const Image& image) { samples.push_back(image); });
-    writer = gif_writer(clip.fps, samples);
+    writer = gif_writer(fps, samples);
   }
   SlowWork slow;
   size_t done = 0;
-  film.draw(all_frames(clip, 1), [&](const Image& image) {
+  film.draw(all_frames(frames), [&](const Image& image) {
     writer->push(image);
-    slow.on(format("drawing frame %zu of %zu", ++done, clip.frames.size()));
+    slow.on(format("drawing frame %zu of %zu", ++done, frames));
   });
   return writer->finish();
 }
 
-/// The file at the rate of the picture, and what is refused of it.
-Showing read_one(const ViewOptions& o, ViewKind kind, uint64_t max_memory) {
+ShowRequest request_of(const ViewOptions& o, ViewKind kind, uint64_t max_memory) {
   ShowRequest request = o.request;
   request.single = kind == ViewKind::picture;
   request.every = o.every.value_or(1);
   request.max_memory = max_memory;
   request.fps = o.fps;
   if (!o.fps && kind == ViewKind::gif && !o.every) request.fps = kUsualGifFps;
-  Showing view = read_showing(request);
-  if (kind == ViewKind::gif && view.clip.fps > kGifFps)
-    throw InputError(request.path,
-                     format("has %g frames per second, more than GIF can show", view.clip.fps),
+  return request;
+}
+
+/// InputError for a rate that the file cannot have.
+void check_rate(const std::string& path, double fps, ViewKind kind) {
+  if (kind == ViewKind::gif && fps > kGifFps)
+    throw InputError(path, format("has %g frames per second, more than GIF can show", fps),
                      format("give --fps up to %g, or write .webp", kGifFps));
   const double longest = kind == ViewKind::gif ? 600 : 16000;  // seconds that files can state
-  if (is_animation(kind) && view.clip.fps * longest < 1)
-    throw InputError(request.path, format("would show each frame for %.0f s", 1 / view.clip.fps),
+  if (is_animation(kind) && fps * longest < 1)
+    throw InputError(path, format("would show each frame for %.0f s", 1 / fps),
                      "give a smaller --every, or a larger --fps");
-  const std::string name = std::filesystem::path(request.path).filename().string();
+}
+
+/// The file at the rate of the picture.
+Showing read_one(const ViewOptions& o, ViewKind kind, uint64_t max_memory) {
+  Showing view = read_showing(request_of(o, kind, max_memory));
+  check_rate(o.request.path, view.clip.fps, kind);
+  const std::string name = std::filesystem::path(o.request.path).filename().string();
   view.clip.label = view.animation.empty() ? name : name + ": " + view.animation;
   return view;
 }
 
-/// One moment, or an animation, of one file.
-void write_film(const ViewOptions& o, ViewKind kind, Showing& view, Json& document) {
-  const Film film(view.clip, film_options(o, view, kind), view.remarks);
+/// One moment, or an animation. Drawn: a Film or SideBySide of so many frames.
+template <class Drawn>
+void write_drawn(const ViewOptions& o, ViewKind kind, const Drawn& film, const Clip& clip,
+                 Json& document) {
   document["width"] = film.width();
   document["height"] = film.height();
   if (kind == ViewKind::picture)
     film.draw({0}, [&](const Image& image) { write_png(o.out, image); });
   else
-    write_file_atomically(o.out, animation(film, view.clip, kind));
+    write_file_atomically(o.out, animation(film, clip.frames.size(), clip.fps, kind));
 }
 
 /// Several moments side by side, or a page; a row or a view for each clip.
@@ -255,8 +118,11 @@ void write_rows(const ViewOptions& o, ViewKind kind, const std::string& out,
   if (kind == ViewKind::page) {
     PageOptions page;
     page.fps = clips[result].fps;
+    page.labels_below = o.two_takes();
     if (!o.title.empty())
       page.title = o.title;
+    else if (o.two_takes())
+      page.title = clips[0].label + ", " + clips[1].label;
     else if (!o.compares())
       page.title = std::filesystem::path(o.request.path).filename().string();
     write_page(out, clips, page);
@@ -285,11 +151,35 @@ Rows read_beside(const ViewOptions& o, uint64_t max_memory) {
   return read_rows(file, how, r.look, max_memory);
 }
 
+/// Two characters or recordings: --compare's, then the file's.
+Rows write_two_takes(const ViewOptions& o, ViewKind kind, const std::string& out,
+                     uint64_t max_memory, Json& document) {
+  ShowRequest second = request_of(o, kind, max_memory), first = second;
+  first.path = o.compare;
+  first.clip = o.beside.clip.value_or("");
+  first.up = o.beside.up.value_or("");
+  first.scale = o.beside.scale;
+  TwoTakes takes = read_two_takes(first, second);
+  Rows rows;
+  for (Showing& shown : takes.shown) rows.clips.push_back(std::move(shown.clip));
+  rows.result = 1;
+  check_rate(o.request.path, rows.clips[1].fps, kind);
+  if (kind == ViewKind::page || kind == ViewKind::sheet)
+    write_rows(o, kind, out, rows.clips, rows.result, takes.close_up);
+  else
+    write_drawn(
+        o, kind,
+        SideBySide(rows.clips[0], rows.clips[1],
+                   film_options(o, takes.shown[0].facing, takes.close_up, kind), takes.remarks),
+        rows.clips[1], document);
+  document["source"] = o.compare;
+  rows.remarks = std::move(takes.remarks);
+  return rows;
+}
+
 int run_view(const ViewOptions& o, const Common& common) {
   const ViewKind kind = kind_of(o);
-  check_kind(o, kind);
-  check_together(o);
-  check_ranges(o, kind);
+  check_view(o, kind);
   const bool opens = o.out.empty();
   if (opens)
     check_display();
@@ -298,7 +188,9 @@ int run_view(const ViewOptions& o, const Common& common) {
   const std::string out = opens ? page_for(o.request.path) : o.out;
   Json document = {{"out", out}, {"source", Json()}};
   Rows rows;
-  if (o.compares()) {
+  if (o.two_takes()) {
+    rows = write_two_takes(o, kind, out, common.max_memory, document);
+  } else if (o.compares()) {
     rows = read_beside(o, common.max_memory);
     if (!rows.source.empty()) document["source"] = rows.source;
     write_rows(o, kind, out, rows.clips, rows.result, rows.close_up);
@@ -307,7 +199,9 @@ int run_view(const ViewOptions& o, const Common& common) {
     if (kind == ViewKind::page || kind == ViewKind::sheet)
       write_rows(o, kind, out, {view.clip}, 0, view.close_up);
     else
-      write_film(o, kind, view, document);
+      write_drawn(o, kind,
+                  Film(view.clip, film_options(o, view.facing, view.close_up, kind), view.remarks),
+                  view.clip, document);
     document["clip"] = view.animation.empty() ? Json() : Json(view.animation);
     rows.remarks = std::move(view.remarks);
     rows.clips.push_back(std::move(view.clip));
@@ -432,6 +326,7 @@ void add_view(Program& program) {
       "restage view --source walk.bvh --every 2 --out walk.webp\n"
       "restage view scans/ --up z --scale mm --out scans.webp\n"
       "restage view motions.h5 --sequence 3 --out motion.gif\n"
+      "restage view --compare before.glb after.glb --out both.webp\n"
       "restage view result.h5 --compare source --out sheet.png\n"
       "restage view result.h5 --compare mm/ --source-fps 60 --source-up z --source-scale mm --out "
       "page.html\n"
@@ -448,9 +343,11 @@ void add_view(Program& program) {
   app.add_option("--out", options.out,
                  "picture.png, animation.webp, animation.gif or page.html (default: a page in the "
                  "browser)");
-  app.add_option("--compare", options.compare,
-                 "what the motion was taken from, drawn beside it on a sheet (.png) or a page "
-                 "(.html): a file, or the word source for what a result remembers");
+  app.add_option(
+      "--compare", options.compare,
+      "another character or recording, shown in step on the left: same clock, scale and "
+      "camera; of a result or scans what the motion was taken from, on a sheet (.png) or "
+      "a page (.html): a file, or the word source for what a result remembers");
   add_comparison(app, options, false);
   add_camera(app, options);
   app.add_option("--clip", r.clip,

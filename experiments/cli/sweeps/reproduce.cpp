@@ -226,6 +226,7 @@ void add_reproduce(Program& program) {
       "experiments/studies\n"
       "restage reproduce chen2023 --budget paper --plan\n"
       "restage reproduce rekik2024 --printed\n"
+      "restage reproduce ours --budget smoke --out runs/smoke\n"
       "restage reproduce marsot2023 --budget paper --out runs/marsot2023 data.source=amass.h5",
       run_reproduce);
   app.add_option("PAPER", o.paper, "rekik2024, marsot2023, chen2023 or ours")

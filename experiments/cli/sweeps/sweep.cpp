@@ -7,6 +7,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <map>
+#include <set>
 #include <thread>
 
 #include "autograd/base/atomic_file.h"
@@ -17,6 +18,7 @@
 #include "autograd/base/words.h"
 #include "experiments/cli/commands.h"
 #include "experiments/cli/output.h"
+#include "experiments/sweep/asking.h"
 #include "experiments/sweep/plan.h"
 #include "experiments/sweep/pool.h"
 #include "experiments/sweep/sweep_dir.h"
@@ -95,13 +97,27 @@ std::string plan_text(const SweepPlan& plan) {
          " to make, " + std::to_string(plan.shared) + " shared by several trials\n";
 }
 
+/// Of a search that asks, the trials of the folder; without any, those that it will begin with.
+/// Returns whether there are none yet.
+bool fill_in_asked(const std::string& out, sweep::SweepFile& file) {
+  if (!file.search || !file.search->asks()) return false;
+  if (!out.empty()) file.search->asked = sweep::asked_in(out, file.search->space);
+  if (!file.search->asked.empty()) return false;
+  file.search->asked = file.search->first_points();
+  return true;
+}
+
 int run_plan(const PlanOptions& options, const Common& common) {
   auto [path, words] = split(options.arguments);
   if (common.seed_given) words.push_back("seed=" + std::to_string(common.seed));
-  const sweep::SweepFile file = sweep::read_sweep_file(path, words);
+  sweep::SweepFile file = sweep::read_sweep_file(path, words);
+  const bool none_asked = fill_in_asked(options.out, file);
   const SweepPlan plan = sweep::plan_sweep(file);
   Json document = plan_json(plan);
   std::string text = plan_text(plan);
+  if (none_asked)
+    text += "these are the first of " + counted(static_cast<size_t>(file.search->trials), "trial") +
+            "; the others follow from results: 'sweep run' and 'sweep ask' write them one by one\n";
   if (options.measure) {
     const sweep::Forecast forecast = sweep::measure(plan);
     document["forecast"] = {{"seconds", forecast.seconds}, {"memory_bytes", forecast.memory_bytes}};
@@ -115,7 +131,7 @@ int run_plan(const PlanOptions& options, const Common& common) {
     text += "--measure forecasts time and memory from a few steps\n";
   }
   if (!options.out.empty()) {
-    const int stale = sweep::write_sweep_dir(options.out, file, plan);
+    const int stale = sweep::write_sweep_dir(options.out, file, none_asked ? SweepPlan{} : plan);
     if (stale > 0)
       log_warning(std::to_string(stale) + " trials in " + options.out +
                   " are not of this sweep: they stay and are not counted");
@@ -173,6 +189,28 @@ int run_status(const std::string& dir, const Common& common) {
 
 // ---- run ----
 
+/// Trials of the folder that are not `known`, which they become; one more is asked for if there are
+/// none. None: so many as the search says were asked for.
+std::vector<sweep::TrialEntry> ask_for_more(const std::string& out, bool quiet,
+                                            std::set<std::string>* known) {
+  std::vector<sweep::TrialEntry> more;
+  for (const bool asked : {false, true}) {
+    SweepDir dir = sweep::read_sweep_dir(out);
+    if (asked) {
+      if (std::ssize(dir.trials) >= dir.search->trials) return more;
+      std::vector<std::string> words = {"restage", "sweep",   "ask",
+                                        out,       "--up-to", std::to_string(dir.search->trials)};
+      if (quiet) words.emplace_back("--quiet");
+      sweep::run_self(words, "asking for a trial");
+      dir = sweep::read_sweep_dir(out);
+    }
+    for (sweep::TrialEntry& trial : dir.trials)
+      if (known->insert(trial.id).second) more.push_back(std::move(trial));
+    if (!more.empty()) return more;
+  }
+  return more;
+}
+
 int run_run(const RunOptions& options, const Common& common) {
   split(options.arguments);
   if (options.jobs < 1)
@@ -186,7 +224,13 @@ int run_run(const RunOptions& options, const Common& common) {
   make_folder(dir.store);  // now, and not after the first training
   if (::access(dir.store.c_str(), W_OK) != 0) throw_unwritable(dir.store, errno);
   const int each = std::max(1, threads() / options.jobs);
-  const sweep::PoolOutcome outcome = sweep::run_pool(dir, {options.jobs, each});
+  sweep::PoolOptions pool{options.jobs, each, {}};
+  std::set<std::string> known;
+  for (const sweep::TrialEntry& trial : dir.trials) known.insert(trial.id);
+  if (dir.search && dir.search->asks())
+    pool.ask = [&] { return ask_for_more(options.out, common.quiet, &known); };
+  const sweep::PoolOutcome outcome = sweep::run_pool(dir, pool);
+  if (pool.ask) dir = sweep::read_sweep_dir(options.out);
   const Json status = status_json(dir);
   print(common.json, status, counts_text(status));
   finish_output();
@@ -232,9 +276,12 @@ void add_sweep(Program& program) {
       "restage sweep plan smoothness.yaml\n"
       "restage sweep plan sweep.yaml motion.weights.smoothness=0,0.1 motion.optimiser.steps=500\n"
       "restage sweep plan sweep.yaml 'seeds=range(1,6)' --out runs/sweep\n"
-      "restage sweep plan sweep.yaml --measure",
+      "restage sweep plan sweep.yaml --measure\n"
+      "restage sweep plan search.yaml search.trials=50 search.kind=latin\n"
+      "restage sweep plan sweep.yaml 'motion.weights.smoothness=uniform(0,0.3)' search.trials=30",
       run_plan);
-  p.add_option("SWEEP", plan.arguments, "SWEEP.yaml and key=value, key=a,b, key=range(a,b,step)")
+  p.add_option("SWEEP", plan.arguments,
+               "SWEEP.yaml and key=value, key=a,b, key=range(a,b,step), key=uniform(a,b)")
       .required();
   p.add_option("--out", plan.out, "folder to write");
   p.add_flag("--measure", plan.measure, "forecast time and memory from a few steps of each stage");
@@ -260,6 +307,7 @@ void add_sweep(Program& program) {
                                run_stop);
   s.add_option("DIR", stop.dir, "folder of the sweep").required();
   s.add_option("--wait", stop.wait, "seconds to wait for them");
+  add_sweep_ask(program, group);
   add_sweep_table(program, group);
   add_sweep_export(program, group);
 }

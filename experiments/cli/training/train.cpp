@@ -8,19 +8,23 @@
 #include "autograd/base/format.h"
 #include "autograd/base/interrupt.h"
 #include "autograd/base/log.h"
+#include "autograd/base/output_check.h"
 #include "autograd/base/parallel.h"
 #include "autograd/base/temporary.h"
 #include "autograd/kernels/matmul_precision.h"
 #include "experiments/cli/commands.h"
 #include "experiments/cli/output.h"
+#include "experiments/cli/training/find_rate.h"
+#include "experiments/cli/training/resumed.h"
 #include "experiments/cli/training/train.h"
-#include "experiments/observers/loggers.h"
+#include "experiments/cli/training/watched.h"
 #include "experiments/scratch.h"
 #include "experiments/shipped_config.h"
 #include "infer/systems.h"
 #include "nn/config/config.h"
 #include "train/run_provenance.h"
 #include "train/stages/motion_stage.h"
+#include "train/training/identity.h"
 #include "train/training/training.h"
 
 namespace restage::cli {
@@ -55,17 +59,15 @@ struct Request {
   std::vector<std::string> overrides;
 };
 
-void check_resumed(const Request& request, const TrainArguments& a, const Common& common) {
+void check_resumed(const TrainArguments& a, const Common& common) {
   const std::pair<bool, const char*> others[] = {{common.seed_given, "--seed"},
                                                  {a.overfit_batches > 0, "--overfit-batches"},
-                                                 {a.fast_dev_run, "--fast-dev-run"}};
+                                                 {a.fast_dev_run, "--fast-dev-run"},
+                                                 {!a.find_rate.empty(), "--find-rate"}};
   for (const auto& [given, name] : others)
     if (given)
       throw InputError("", std::string(name) + " cannot change a resumed run",
                        "leave it out, or train anew");
-  if (!request.overrides.empty())
-    throw InputError("", "'" + request.overrides[0] + "' cannot change a resumed run",
-                     "leave it out, or train anew");
 }
 
 Request read_request(const TrainArguments& arguments, const Common& common) {
@@ -91,9 +93,19 @@ Request read_request(const TrainArguments& arguments, const Common& common) {
         out.config.empty() ? "no configuration was given"
                            : "a resumed run has its own configuration",
         "use 'restage train CONFIG.yaml [key=value ...]' or 'restage train resume=RUN_DIR'");
-  if (!out.resume.empty()) check_resumed(out, arguments, common);
+  if (!out.resume.empty()) check_resumed(arguments, common);
   if (arguments.overfit_batches < 0)
     throw InputError("", "--overfit-batches is out of range", "give 1 or more");
+  if (!arguments.find_rate.empty() && !arguments.find_rate.ends_with(".svg"))
+    throw InputError(arguments.find_rate, "is no picture that can be written",
+                     "give --find-rate a name that ends in .svg");
+  if (!arguments.find_rate.empty() && (arguments.dry_run || arguments.fast_dev_run))
+    throw InputError("", "--find-rate takes other steps than --dry-run and --fast-dev-run",
+                     "give one of them at a time");
+  if (!arguments.profile.empty() &&
+      (arguments.dry_run || arguments.print_config || !arguments.find_rate.empty()))
+    throw InputError("", "--profile times a training, and nothing is trained here",
+                     "leave it out, or try --fast-dev-run, which trains three steps");
   if (common.seed_given) out.overrides.push_back("seed=" + std::to_string(common.seed));
   if (arguments.overfit_batches > 0)
     out.overrides.push_back("loop.overfit_batches=" + std::to_string(arguments.overfit_batches));
@@ -108,7 +120,7 @@ TrainConfig configured(const Request& request) {
                        "make the data with 'restage data build', and give data.source=FOLDER");
     load_config(request.config, request.overrides, config);
   } else {
-    read_config(of_this_version(load_config_tree(run_config_path(request.resume))), config);
+    config = resumed_config(request.resume, request.overrides);
   }
   if (config.data.one_mesh && config.data.source != "builtin")
     log_warning("data.one_mesh is for built-in data; those of " + config.data.source +
@@ -141,6 +153,8 @@ std::string products_in(const TrainConfig& config) {
 
 RunInput provenance_of(const TrainConfig& config, const TrainingData& data, const Common& common) {
   RunInput out{config.seed, threads(), common.command_line, {}, resolved_yaml(config)};
+  for (const NetworkSource& network : network_sources(config))
+    out.networks.push_back({network.stage, network.model, network.source});
   if (config.data.source != "builtin")
     out.data.push_back({config.data.source, checksum(data.train) + checksum(data.validation)});
   return out;
@@ -148,20 +162,19 @@ RunInput provenance_of(const TrainConfig& config, const TrainingData& data, cons
 
 /// Trains in a run directory and leaves its weights there.
 void train_in(RunDir& run, const TrainConfig& config, const TrainingData& data,
-              const TrainArguments& arguments, const Common& common) {
+              const TrainArguments& arguments, const Common& common, Profiled* profile) {
   log_info("seed " + std::to_string(config.seed) + ", " + std::to_string(threads()) + " threads; " +
            std::to_string(data.train.bodies.size()) + " bodies and " +
            std::to_string(data.train.motions.size()) + " motions to train on" +
            products_in(config));
-  TensorBoardLog tensorboard(run.dir());
-  CsvLog csv(run.dir());
+  Watched watched(run.dir(), config, arguments, data.team->rank() == 0, profile);
   TrainOptions options;
   options.team = data.team;
   options.quiet = common.quiet || data.team->rank() > 0;
-  if (arguments.tensorboard) options.observers.push_back(&tensorboard);
-  if (arguments.csv) options.observers.push_back(&csv);
-  for (TrainObserver* more : arguments.observers) options.observers.push_back(more);
-  save_bundle(run.dir() + "/weights.safetensors", train_run(run, config, data, options));
+  options.observers = watched.observers();
+  watched.run([&] {
+    save_bundle(run.dir() + "/weights.safetensors", train_run(run, config, data, options));
+  });
 }
 
 int dry_run(const TrainConfig& config, const TrainingData& data, const Common& common) {
@@ -189,15 +202,31 @@ int dry_run(const TrainConfig& config, const TrainingData& data, const Common& c
   return 0;
 }
 
+/// Sweeps the rate of every stage; writes the picture and nothing else.
+int find_rate(const TrainConfig& config, const TrainingData& data, const std::string& picture,
+              const std::string& source, const Common& common) {
+  const StopScope stop;
+  check_output(picture, {source});
+  std::optional<AtomicFile> file;  // made at once: a place that cannot be written is told before
+  if (data.team->rank() == 0) file.emplace(picture);
+  const std::vector<RateSweep> sweeps = find_rates(config, data);
+  if (!file) return 0;
+  file->write(rates_svg(sweeps));
+  file->commit();
+  print(common.json, rates_json(sweeps), rates_markdown(sweeps));
+  log_info("wrote " + picture);
+  return 0;
+}
+
 /// Everything a training does, in a folder that is removed.
 int fast_dev_run(const TrainConfig& config, const TrainingData& data,
-                 const TrainArguments& arguments, const Common& common) {
+                 const TrainArguments& arguments, const Common& common, Profiled* profile) {
   const Scratch scratch;
   const RunInput input = provenance_of(config, data, common);
   {
     RunDir run = RunDir::create_at(scratch.file("run"), input.resolved_yaml, provenance_json(input),
                                    config.trained());
-    train_in(run, config, data, arguments, common);
+    train_in(run, config, data, arguments, common, profile);
     load_bundle(run.dir());
   }
   print(common.json, {{"fast_dev_run", true}, {"stages", config.stages}},
@@ -239,6 +268,17 @@ RunDir run_of(const Request& request, const TrainConfig& config, const RunInput&
   return RunDir::resume(folder, config.trained());
 }
 
+TrainingData data_of(const TrainConfig& config, const Request& request) {
+  try {
+    return TrainingData(config.data);
+  } catch (const InputError& error) {
+    std::error_code ignored;
+    if (request.resume.empty() || fs::exists(config.data.source, ignored)) throw;
+    throw InputError(error.where(), error.cause(),
+                     "if the data have moved, say where they are with data.source=PATH");
+  }
+}
+
 int train_with(Team& team, const TrainArguments& arguments, const Common& common) {
   const Request request = read_request(arguments, common);
   TrainConfig config = configured(request);
@@ -249,21 +289,33 @@ int train_with(Team& team, const TrainArguments& arguments, const Common& common
     print(common.json, {{"config", resolved_yaml(config)}, {"keys", keys}}, resolved_yaml(config));
     return 0;
   }
-  TrainingData data(config.data);
+  TrainingData data = data_of(config, request);
   data.team = &team;
   const RunInput input = provenance_of(config, data, common);
-  if (!request.resume.empty() && team.rank() == 0) check_same_run(request.resume, input);
+  if (!request.resume.empty() && team.rank() == 0)
+    check_same_run(request.resume, input, request.overrides,
+                   resolved_as_begun(request.resume, request.overrides));
   check_stages(config, data);
   for (const std::string& remark : remarks(config.data, data.train)) log_warning(remark);
   if (arguments.dry_run) return dry_run(config, data, common);
-  if (arguments.fast_dev_run) return fast_dev_run(config, data, arguments, common);
+  if (!arguments.find_rate.empty())
+    return find_rate(config, data, arguments.find_rate, request.config, common);
+  std::optional<Profiled> profiled;
+  if (!arguments.profile.empty() && team.rank() == 0) {
+    check_output(arguments.profile, {request.config});
+    profiled.emplace(arguments.profile);
+  }
+  Profiled* profile = profiled ? &*profiled : nullptr;
+  if (arguments.fast_dev_run) return fast_dev_run(config, data, arguments, common, profile);
 
   std::optional<Scratch> scratch;
   RunDir run = run_of(request, config, input, team, &scratch);
+  if (!request.resume.empty() && team.rank() == 0)
+    write_resumed(request.resume, input, request.overrides);
   if (team.rank() == 0)
     print(common.json, {{"run", run.dir()}, {"seed", config.seed}}, run.dir() + "\n");
   finish_output();
-  train_in(run, config, data, arguments, common);
+  train_in(run, config, data, arguments, common, profile);
   if (team.rank() == 0) log_info("weights: " + run.dir() + "/weights.safetensors");
   return 0;
 }
@@ -304,7 +356,11 @@ void add_train(Program& program) {
       "restage train configs/lite/all.yaml stages=[skeleton] --overfit-batches 1\n"
       "restage train configs/lite/all.yaml data.source=data.h5 --print-config\n"
       "restage train configs/lite/all.yaml data.source=data.h5 --fast-dev-run\n"
-      "restage train resume=runs/demo-20260101-120000-1",
+      "restage train configs/lite/all.yaml stages=[skeleton] --find-rate rate.svg\n"
+      "restage train configs/demo.yaml --fast-dev-run --profile trace.json\n"
+      "restage train resume=runs/demo-20260101-120000-1\n"
+      "restage train resume=runs/demo-20260101-120000-1 data.source=moved/data.h5 "
+      "motion.optimiser.steps=8000",
       run_train);
   add_train_options(app, a);
 }
@@ -318,8 +374,16 @@ void add_train_options(CommandOptions app, TrainArguments& a) {
                "check all, forecast time and memory from some steps of each stage, write nothing");
   app.add_flag("--fast-dev-run", a.fast_dev_run,
                "three steps, a validation and a checkpoint of each stage; keep nothing");
+  app.add_option("--find-rate", a.find_rate,
+                 "let each stage's rate grow over 100 steps, suggest one, draw the loss as F.svg; "
+                 "write nothing else")
+      .one_at_a_time();
   app.add_option("--overfit-batches", a.overfit_batches,
                  "train on the same N batches again and again: can they be learned? (default: no)");
+  app.add_option("--profile", a.profile,
+                 "time ops and modules; a table in the log, and F.json for Perfetto or "
+                 "chrome://tracing")
+      .one_at_a_time();
   app.add_flag("--tensorboard", a.tensorboard, "event files in RUN/tensorboard");
   app.add_flag("--csv", a.csv, "RUN/metrics.csv besides metrics.jsonl");
 }

@@ -13,6 +13,8 @@ struct TrainArguments {
   std::vector<std::string> words;
   int64_t overfit_batches = 0;
   bool fast_dev_run = false, dry_run = false, print_config = false;
+  std::string find_rate;  ///< the picture; empty: rates are not sought
+  std::string profile;    ///< the trace; empty: nothing is timed
   bool tensorboard = false, csv = false;
   std::vector<TrainObserver*> observers = {};  ///< beside those that the options ask for
 };

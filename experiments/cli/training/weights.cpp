@@ -27,7 +27,9 @@ Json shape_json(const Shape& shape) {
   return out;
 }
 
-int run_show(const std::string& path, const Common& common) {
+/// `given`: a safetensors file, a run, or the name of weights that come with the program.
+int run_show(const std::string& given, const Common& common) {
+  const std::string path = weights_path(given);
   const TensorFile file = read_safetensors(path);
   int64_t values = 0;
   for (const auto& item : file.tensors) values += item.second.numel();
@@ -250,10 +252,12 @@ void add_export(Program& program, CommandOptions group) {
 
 void add_weights(Program& program) {
   CommandOptions group = program.add_group("weights", "look into weights files, import and export");
-  auto [show, file] = program.add(
-      group, "show", "list what a safetensors file holds",
-      "restage weights show w.safetensors\nrestage weights show w.safetensors --json", run_show);
-  show.add_option("FILE", file, "safetensors file").required();
+  auto [show, file] =
+      program.add(group, "show", "list what a safetensors file holds",
+                  "restage weights show w.safetensors\nrestage weights show w.safetensors --json\n"
+                  "restage weights show standard",
+                  run_show);
+  show.add_option("FILE", file, "safetensors file; or a run, standard or lite").required();
   add_import(program, group);
   add_export(program, group);
   add_average(program, group);

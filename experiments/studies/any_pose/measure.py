@@ -1,11 +1,13 @@
 """Targets that do not stand in T-pose: how far the T-pose, the joints and the skin that retarget finds are from the truth.
 
   python3 measure.py PROGRAM real.h5 --out any_pose.json
+  python3 measure.py PROGRAM real.h5 --clothes DATA_FOLDER --out clothed.json
 
 real.h5: `restage data import DATA_FOLDER --out real.h5`. Test bodies are posed with their true joints and weights (linear blend
-skinning): in A-pose, and in 50 frames of test motions. Each is a target without a rig; what is read is the .glb that comes out.
+skinning): in A-pose, and in 50 frames of test motions. Each is a target without a rig; what is read is the .glb that comes out. With --clothes the people wear the data folder's garments in
+turn: a mesh of the garment and of the skin that it leaves bare.
 """
-import argparse, json, os, struct, subprocess, sys, tempfile
+import argparse, glob, gzip, json, os, struct, subprocess, sys, tempfile
 import h5py
 import numpy as np
 
@@ -78,6 +80,50 @@ def aligned(a, b):
     return (a - ca) @ (u @ vt) * s.sum() / ((a - ca) ** 2).sum() + cb
 
 
+def covered(path):
+    """The vertices of the skin that a garment hides, by its .mhclo file: numbers, and ranges with a minus between."""
+    text = gzip.open(path, "rt").read()
+    words, out = text[text.index("delete_verts") + len("delete_verts"):].split() if "delete_verts" in text else [], []
+    for k, word in enumerate(words):
+        if word == "-":
+            out += range(out[-1], int(words[k + 1]))
+        elif word.isdigit():
+            out.append(int(word))
+        else:
+            break
+    return np.array(out, int)
+
+
+class Wardrobe:
+    """Test people, naked or in the garments of a data folder in turn."""
+
+    def __init__(self, program, file, folder, clothes):
+        self.file, self.garments = file, []
+        for path in sorted(glob.glob(os.path.join(clothes, "body", "clothes", "*.mhclo.gz"))) if clothes else []:
+            name = os.path.basename(path)[:-len(".mhclo.gz")]
+            out = os.path.join(folder, name + ".h5")
+            subprocess.run([program, "data", "import", clothes, "--garment", name, "--out", out, "--quiet"], check=True, stdout=subprocess.DEVNULL)
+            self.garments.append((name, h5py.File(out), covered(path)))
+
+    @staticmethod
+    def surface(file, name):
+        body = file["bodies"][name]
+        topology = body.attrs["topology"]
+        return [np.asarray(body[k], float) for k in ("vertices", "joints", "weights")] + [file["topologies"][topology.decode() if isinstance(topology, bytes) else topology][()]]
+
+    def person(self, name, number):
+        """Vertices, joints, weights, faces; what is worn."""
+        vertices, joints, weights, faces = self.surface(self.file, name)
+        if not self.garments:
+            return vertices, joints, weights, faces, ""
+        garment, file, hidden = self.garments[number % len(self.garments)]
+        bare = np.ones(len(vertices), bool)
+        bare[hidden[hidden < len(vertices)]] = False
+        faces = faces[bare[faces].all(1)]
+        used, faces = np.unique(faces, return_inverse=True)
+        over, _, shares, sewn = self.surface(file, name + "_" + garment)
+        return (np.concatenate([vertices[used], over]), joints, np.concatenate([weights[used], shares]),
+                np.concatenate([faces.reshape(-1, 3), sewn + len(used)]), garment)
 
 
 def measure(program, folder, vertices, faces, joints, weights, world, motion):
@@ -98,6 +144,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("program")
     parser.add_argument("data")
+    parser.add_argument("--clothes", default="")
     parser.add_argument("--out", required=True)
     parser.add_argument("--bodies", type=int, default=20)
     parser.add_argument("--poses", type=int, default=50)
@@ -123,16 +170,15 @@ def main():
                 short = item[name][:2]
                 del item[name]
                 item[name] = short
+        wardrobe = Wardrobe(args.program, file, folder, args.clothes)
         for b, name in enumerate(bodies):
-            body = file["bodies"][name]
-            faces = file["topologies"][body.attrs["topology"].decode() if isinstance(body.attrs["topology"], bytes) else body.attrs["topology"]][()]
-            truth = [np.asarray(body[k], float) for k in ("vertices", "joints", "weights")]
+            *truth, faces, worn = wardrobe.person(name, b)
             jobs = {"T-pose": a_pose(0), "A-pose, arms 35 degrees down": a_pose(35), "A-pose, arms 55 degrees down": a_pose(55)}
             own = list(poses)[b * args.poses // len(bodies):(b + 1) * args.poses // len(bodies)]
             jobs.update({pose: poses[pose] for pose in own})
             for pose, world in jobs.items():
                 row = measure(args.program, folder, truth[0], faces, truth[1], truth[2], world, motion)
-                rows.append({"body": name, "pose": pose, **row})
+                rows.append({"body": name, **({"garment": worn} if worn else {}), "pose": pose, **row})
                 print(rows[-1], file=sys.stderr)
     kinds = {"T-pose": lambda p: p == "T-pose", "A-pose": lambda p: p.startswith("A-pose"), "any pose": lambda p: "frame" in p}
     table = {}
