@@ -24,6 +24,9 @@ RATIOS = ("skeleton_train", "skeleton_online", "smrm_train_b16", "smrm_train_b64
           "npt_lite_train", "npt_paper_train", "lart_lite_train", "lart_paper_train", "corenet_lite_train",
           "corenet_paper_train", "cross_attention_1k", "cross_attention_7k", "cross_attention_13k")
 LEAST_ROUNDS, WANTED_ROUNDS, MOST_ROUNDS = 3, 5, 9
+# What keeps LibTorch, OpenBLAS, BLIS and oneDNN to a set of vector instructions that is not the processor's best.
+LIMITED = {"avx2": {"ATEN_CPU_CAPABILITY": "avx2", "OPENBLAS_CORETYPE": "Haswell", "BLIS_ARCH_TYPE": "haswell",
+                    "ONEDNN_MAX_CPU_ISA": "AVX2"}}
 REQUEST_SECONDS = 0.6  # short repetitions are bundled: the system counts processor time in 10 ms
 FOREIGN_LIMIT = 0.05   # cores used by others during a request that counts as undisturbed
 TICK = 1 / os.sysconf("SC_CLK_TCK")
@@ -89,10 +92,12 @@ def library_folder(name):
 class Programs:
     """Starts either side in any of its settings."""
 
-    def __init__(self, ours, libtorch, inputs):
+    def __init__(self, ours, libtorch, inputs, instructions=None):
         self.ours, self.libtorch, self.inputs = ours, libtorch, inputs
-        self.environment = {k: v for k, v in os.environ.items()
-                            if not k.startswith(("OMP_", "GOMP_", "OPENBLAS_", "BLIS_", "GLIBC_", "LD_"))}
+        self.environment = {k: v for k, v in os.environ.items() if not k.startswith(
+            ("OMP_", "GOMP_", "OPENBLAS_", "BLIS_", "GLIBC_", "LD_", "ATEN_", "DNNL_", "ONEDNN_"))}
+        self.limited = LIMITED[instructions] if instructions else {}
+        self.words = ["--instructions", instructions] if instructions else []
 
     def list(self):
         out = subprocess.run([self.ours, "list", self.inputs], check=True, capture_output=True, text=True)
@@ -107,9 +112,9 @@ class Programs:
     def start(self, side):
         """`side`: a variant of ours, or one of settings()."""
         if isinstance(side, str):
-            return Process([self.ours, "serve", self.inputs], self.environment, greeting=False)
+            return Process([self.ours, "serve", *self.words, self.inputs], self.environment, greeting=False)
         kind, threads = side
-        e = dict(self.environment)
+        e = {**self.environment, **self.limited}
         for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "BLIS_NUM_THREADS"):
             e[name] = str(threads)
         blas = "openblas-pthread" if kind == "installed" else "blis-openmp"
@@ -320,6 +325,7 @@ def arguments():
     p.add_argument("--inputs", required=True, help="the folder that 'restage_bench inputs' made")
     p.add_argument("--libtorch", help="libtorch_bench (none: no comparison)")
     p.add_argument("--json", help="file for all figures")
+    p.add_argument("--instructions", choices=sorted(LIMITED), help="both sides use these vector instructions at most")
     p.add_argument("--items", help="only these, separated by commas")
     p.add_argument("--minutes", type=float, default=12, help="about how long to measure (default 12)")
     p.add_argument("--quick", action="store_true", help="every item once: to try the program, not a result")
@@ -332,7 +338,7 @@ def arguments():
 
 def main():
     a = arguments()
-    programs = Programs(a.program, a.libtorch, a.inputs)
+    programs = Programs(a.program, a.libtorch, a.inputs, a.instructions)
     items = programs.list()
     if a.items:
         unknown = set(a.items.split(",")) - {i["name"] for i in items}
@@ -345,7 +351,8 @@ def main():
     for item in items:
         item["compared"] = bool(a.libtorch) and not item["name"].endswith("_lite") and not is_reading(item)
     compared = [i for i in items if i["compared"]]
-    out = {"ratios": {}, "ratios_installed": {}, "reading": {}, "memory": {}, "quick": a.quick, "machine": machine()}
+    out = {"ratios": {}, "ratios_installed": {}, "reading": {}, "memory": {}, "quick": a.quick, "machine": machine(),
+           "limited_to": a.instructions}
     if a.libtorch:
         say("do both give the same answers?")
         out["agreement"] = agreement(programs, compared)

@@ -39,6 +39,8 @@ def head(out):
                      f"{d['limit_cores']} cores (up to {d['worst_cores']:.2f}), also when repeated.")
     else:
         lines.append(f"Undisturbed: in all {d['requests']} requests others used at most {d['limit_cores']} cores.")
+    if out["limited_to"]:
+        lines.insert(0, f"**Both sides use {out['limited_to']} at most**, not all that the processor has.")
     if out["quick"]:
         lines.insert(0, "**Not a result: made with --quick.**")
     return "\n\n".join(lines)

@@ -26,6 +26,7 @@
 #include <sstream>
 
 #include "autograd/base/parallel.h"
+#include "autograd/kernels/instruction_sets.h"
 #include "autograd/kernels/stats.h"
 #include "autograd/tensor/tensor.h"
 #include "bench/items.h"
@@ -152,7 +153,7 @@ int serve(const std::string& folder) {
 int run(int argc, char** argv) {
   CLI::App app("Times Restage; bench/README.md says how");
   app.require_subcommand(1);
-  std::string folder;
+  std::string folder, instructions;
   InputSettings settings;
   int threads = 0;
   CLI::App* make = app.add_subcommand("inputs", "make the folder of inputs");
@@ -163,9 +164,12 @@ int run(int argc, char** argv) {
   CLI::App* show = app.add_subcommand("list", "list the items as JSON");
   CLI::App* answer = app.add_subcommand("serve", "answer requests on standard input");
   answer->add_option("--threads", threads, "number of threads (0: all cores)");
+  answer->add_option("--instructions", instructions,
+                     "set of vector instructions, e.g. avx2 (default: the best)");
   for (CLI::App* sub : {make, show, answer}) sub->add_option("folder", folder)->required();
   CLI11_PARSE(app, argc, argv);
   set_threads(threads);
+  if (!instructions.empty()) use_instruction_set(instructions);
   if (*make) make_inputs(folder, settings);
   if (*show) std::cout << list(Inputs(folder)).dump(1) << '\n';
   return *answer ? serve(folder) : 0;

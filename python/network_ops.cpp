@@ -6,6 +6,7 @@
 #include "autograd/ops/points.h"
 #include "autograd/ops/pooled_norm.h"
 #include "autograd/ops/rnn.h"
+#include "autograd/ops/transport.h"
 #include "python/engine.h"
 #include "python/ops.h"
 
@@ -89,6 +90,14 @@ PyVar neighbours(const std::array<O, 9>& given, const O& index, double scale, bo
 }
 
 void add_attention(py::module_& m) {
+  m.def(
+      "sinkhorn",
+      [](const O& kernel, int steps, double epsilon) {
+        return op_of([=](const Var& k) { return sinkhorn(k, steps, epsilon); }, kernel);
+      },
+      py::arg("kernel"), py::arg("steps") = 5, py::arg("epsilon") = 1e-8,
+      "The plan of optimal transport between uniform margins by Sinkhorn's steps: positive numbers "
+      "[n, v, p] -> [n, v, p].");
   m.def(
       "cross_attention",
       [](const O& q, const O& k, const O& v, double factor) {

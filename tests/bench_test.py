@@ -138,7 +138,7 @@ class Report(unittest.TestCase):
     def test_tables(self):
         item = {**ITEM, "ratios": measure.ratios(ITEM)}
         text = report.markdown({
-            "items": [item], "reading": {}, "machine": measure.machine(), "quick": True, "agreement": {"skeleton_train": 1e-6},
+            "items": [item], "reading": {}, "machine": measure.machine(), "limited_to": "avx2", "quick": True, "agreement": {"skeleton_train": 1e-6},
             "disturbed": {"requests": 9, "above_limit": 1, "limit_cores": 0.05, "worst_cores": 0.5},
             "memory": {"skeleton_train": {"ours": 10.0, "libtorch_tuned": 40.0}}})
         self.assertIn("Not a result", text)

@@ -264,15 +264,19 @@ void empty_sum(const Product<T>& p) {
 
 template <class T>
 void run(const MatmulArgs& args, const MatmulSizes& s) {
-  const int64_t batch = s.batch, m = s.m, n = s.n, k = s.k;
+  // One column times a matrix is one row times the transposed matrix: both lie alike in memory.
+  const bool column = s.n == 1 && args.bias == nullptr;
+  const int64_t batch = s.batch, m = column ? 1 : s.m, n = column ? s.m : s.n, k = s.k;
   if (m == 0 || n == 0 || batch == 0) return;
   const auto product = [&](int64_t i) {
-    return Product<T>{{args.a.data<T>() + i * s.a.step, s.a.row, s.a.col},
-                      {args.b.data<T>() + i * s.b.step, s.b.row, s.b.col},
-                      args.out.data<T>() + i * s.m * s.n,
-                      s.m,
-                      s.n,
-                      s.k,
+    const Strided<T> a{args.a.data<T>() + i * s.a.step, s.a.row, s.a.col};
+    const Strided<T> b{args.b.data<T>() + i * s.b.step, s.b.row, s.b.col};
+    return Product<T>{column ? Strided<T>{b.data, b.col, b.row} : a,
+                      column ? Strided<T>{a.data, a.col, a.row} : b,
+                      args.out.data<T>() + i * m * n,
+                      m,
+                      n,
+                      k,
                       args.bias ? args.bias->data<T>() : nullptr,
                       args.activation,
                       args.accumulate};

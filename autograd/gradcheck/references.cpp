@@ -55,6 +55,18 @@ Var modulate_reference(const Var& x, const Var& mesh, const Var& scale, const Va
   return activation == Activation::relu ? relu(y) : y;
 }
 
+Var sinkhorn_reference(const Var& kernel, int steps, double epsilon) {
+  const int64_t n = kernel.size(0), v = kernel.size(1), p = kernel.size(2);
+  const Var row(Tensor::full({n, v, 1}, 1.0 / static_cast<double>(v), kernel.dtype()));
+  const Var column(Tensor::full({n, p, 1}, 1.0 / static_cast<double>(p), kernel.dtype()));
+  Var a = row, b;
+  for (int i = 0; i < steps; ++i) {
+    b = column / add_scalar(matmul(kernel, a, true), epsilon);
+    a = row / add_scalar(matmul(kernel, b), epsilon);
+  }
+  return a * kernel * reshape(b, {n, 1, p});
+}
+
 Var cross_attention_reference(const Var& q, const Var& k, const Var& v, double factor) {
   const Var product = matmul(q, k, false, true);
   return matmul(softmax(factor == 1 ? product : scale(product, factor)), v);

@@ -22,6 +22,7 @@ Registry<OpSamples, &OpSamples::op>& known() {
     add_rnn(t);
     add_rotation(t);
     add_swing(t);
+    add_transport(t);
     return t;
   }());
   return all;

@@ -20,6 +20,7 @@ void add_reduce(Table& table);
 void add_rnn(Table& table);
 void add_rotation(Table& table);
 void add_swing(Table& table);
+void add_transport(Table& table);
 
 /// A shape of `min_rank` to `max_rank` dimensions of 0 to `most` (zeros are rare).
 Shape random_shape(Rng& rng, int min_rank, int max_rank, int64_t most = 4);

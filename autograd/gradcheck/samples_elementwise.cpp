@@ -187,6 +187,9 @@ void add_elementwise(Table& t) {
                      [](Args x) { return maximum(x[0], x[1]); }, {full, zeros});
   of("pow").kink("of no positive number", {f64({2}, {0, -2}), f64({2}, {2, 3})},
                  [](Args x) { return pow(x[0], x[1]); }, {f64({2}, {0, 12}), zeros});
+  of("prelu").kink(
+      "at 0 it has the slope of its negative side", {f64({3}, {0, 2, -2}), f64({1}, {0.25})},
+      [](Args x) { return prelu(x[0], x[1]); }, {f64({3}, {0.25, 1, 0.25}), f64({1}, {-2})});
   const Build angle = [](Args x) { return atan2(x[0], x[1]); };
   of("atan2").add("all quadrants and axes",
                   {f64({7}, {1, 2, -1, -3, 1, -1, 0}), f64({7}, {2, -1, -3, 1, 0, 0, 2})}, angle);

@@ -49,6 +49,7 @@ struct Row;
   struct Row<Binary::name> {                                                   \
     template <class T>                                                         \
     RESTAGE_ANYWHERE static T value(T a, T b) {                                \
+      [[maybe_unused]] const T zero = 0;                                       \
       return formula;                                                          \
     }                                                                          \
     template <int input, class T>                                              \

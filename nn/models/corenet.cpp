@@ -36,12 +36,8 @@ PointResBlock::PointResBlock(int64_t channels, const Init& init)
 Var PointResBlock::operator()(Context& ctx, const Var& x) const {
   const ModuleScope path(scope);
   const Var a = ctx.bind(slope);
-  const auto act = [&](const Var& y) {
-    const Var positive = relu(y);
-    return positive + a * (y - positive);
-  };
-  const Var h = act(instance_norm(conv1(ctx, x)));
-  return act(x + instance_norm(conv2(ctx, h)));
+  const Var h = prelu(instance_norm(conv1(ctx, x)), a);
+  return prelu(x + instance_norm(conv2(ctx, h)), a);
 }
 
 void PointResBlock::visit(Fields& f) {

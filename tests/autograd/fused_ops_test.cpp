@@ -18,6 +18,7 @@
 #include "autograd/ops/pooled_norm.h"
 #include "autograd/ops/reduce.h"
 #include "autograd/ops/rnn.h"
+#include "autograd/ops/transport.h"
 #include "tests/support/expect_near.h"
 #include "tests/support/use_set.h"
 
@@ -36,6 +37,7 @@ using gradcheck::pooled_norm_reference;
 using gradcheck::random;
 using gradcheck::same_bits;
 using gradcheck::Sample;
+using gradcheck::sinkhorn_reference;
 
 /// Values and gradients of two ways to compute the same.
 void expect_equal(const std::vector<Tensor>& inputs, const Build& fused, const Build& reference,
@@ -293,6 +295,16 @@ TEST(FusedOps, ModulateIsItsReference) {
            random({c, 3}, 5), random({c}, 6)},
           [=](Args x) { return modulate(x[0], x[1], x[2], x[3], x[4], x[5], act); },
           [=](Args x) { return modulate_reference(x[0], x[1], x[2], x[3], x[4], x[5], act); });
+}
+
+TEST(FusedOps, SinkhornIsItsReference) {
+  for (const int steps : {1, 5, 9})
+    for (const auto& [n, v, p] :
+         {std::array<int64_t, 3>{1, 1, 1}, {2, 7, 5}, {1, 300, 280}, {3, 40, 70}})
+      expect_fused(
+          {exp(Var(random({n, v, p}, 1))).value},
+          [=](Args x) { return sinkhorn(x[0], steps, 1e-3); },
+          [=](Args x) { return sinkhorn_reference(x[0], steps, 1e-3); });
 }
 
 TEST(FusedOps, PooledNormReportsTheStatisticsOfItsReference) {
