@@ -79,6 +79,12 @@ void add_norms(py::module_& m) {
       "B [c, 3], a and b [c].");
 }
 
+PyVar elain_of(const std::array<O, 5>& given, double slope) {
+  const auto v = vars_of(given);
+  return run_op(pointers(v),
+                [&] { return elain(v[0].var, v[1].var, v[2].var, v[3].var, v[4].var, slope); });
+}
+
 PyVar neighbours(const std::array<O, 9>& given, const O& index, double scale, bool dense) {
   const auto v = vars_of(given);
   const Tensor at = index_of(index);
@@ -90,6 +96,15 @@ PyVar neighbours(const std::array<O, 9>& given, const O& index, double scale, bo
 }
 
 void add_attention(py::module_& m) {
+  m.def(
+      "elain",
+      [](const O& x, const O& unit, const O& gamma, const O& beta, const O& share, double slope) {
+        return elain_of({x, unit, gamma, beta, share}, slope);
+      },
+      py::arg("x"), py::arg("unit"), py::arg("gamma"), py::arg("beta"), py::arg("share"),
+      py::arg("slope") = 1.0,
+      "share (gamma unit + beta) + unit + (1 - share) x, times slope where that is 0 or less: all "
+      "[n, v, c], share [n, c].");
   m.def(
       "sinkhorn",
       [](const O& kernel, int steps, double epsilon) {

@@ -207,6 +207,74 @@ void modulate_grad_of(const ModulateGradArgs& a) {
   add_up(a, parts, to_sums, to_rows);
 }
 
+/// What ElaIN makes before its activation, of a part that both want.
+template <class V>
+struct Mixed {
+  V asked, out;
+  HWY_INLINE Mixed(V x, V unit, V gamma, V beta, V share)
+      : asked(hn::MulAdd(gamma, unit, beta)),
+        out(hn::MulAdd(share, asked, hn::NegMulAdd(share, x, hn::Add(unit, x)))) {}
+};
+
+template <class T>
+void elain_of(const ElainArgs& a) {
+  const int64_t v = a.x.size(1), c = a.x.size(2);
+  const auto slope = static_cast<T>(a.slope);
+  const auto mix = [slope](auto x, auto unit, auto gamma, auto beta, auto share) HWY_ATTR {
+    const hn::DFromV<decltype(x)> d;
+    const auto y = Mixed(x, unit, gamma, beta, share).out;
+    return hn::IfThenElse(hn::Gt(y, hn::Zero(d)), y, hn::Mul(y, hn::Set(d, slope)));
+  };
+  parallel_for(a.x.size(0) * v, row_grain(c), [&](int64_t from, int64_t to) HWY_ATTR {
+    for (int64_t r = from; r < to; ++r)
+      map(c, a.out.data<T>() + r * c, mix, a.x.data<T>() + r * c, a.unit.data<T>() + r * c,
+          a.gamma.data<T>() + r * c, a.beta.data<T>() + r * c, a.share.data<T>() + r / v * c);
+  });
+}
+
+/// Rows [first, first + rows) of all points; `share` [c] is their item's, `sums` [c] the part's sum
+/// of the gradient of it.
+template <class T>
+void elain_grad_part(const ElainGradArgs& a, int64_t first, int64_t rows, const T* share, T* sums) {
+  const int64_t c = a.x.size(2);
+  for_channels<T>(c, [&](auto d, int64_t i) HWY_ATTR {
+    const auto s = hn::LoadU(d, share + i), zero = hn::Zero(d);
+    const auto slope = hn::Set(d, static_cast<T>(a.slope));
+    auto sum = zero;
+    for (int64_t at = first * c + i; at < (first + rows) * c; at += c) {
+      const auto load = [&](const Tensor& t) HWY_ATTR { return hn::LoadU(d, t.data<T>() + at); };
+      const auto x = load(a.x), unit = load(a.unit), gamma = load(a.gamma), gy = load(a.gy);
+      const Mixed mixed(x, unit, gamma, load(a.beta), s);
+      const auto g = hn::IfThenElse(hn::Gt(mixed.out, zero), gy, hn::Mul(gy, slope));
+      const auto of_asked = hn::Mul(g, s);
+      hn::StoreU(hn::Sub(g, of_asked), d, a.g_x.data<T>() + at);
+      hn::StoreU(hn::MulAdd(of_asked, gamma, g), d, a.g_unit.data<T>() + at);
+      hn::StoreU(hn::Mul(of_asked, unit), d, a.g_gamma.data<T>() + at);
+      hn::StoreU(of_asked, d, a.g_beta.data<T>() + at);
+      sum = hn::MulAdd(g, hn::Sub(mixed.asked, x), sum);
+    }
+    hn::StoreU(sum, d, sums + i);
+  });
+}
+
+template <class T>
+void elain_grad_of(const ElainGradArgs& a) {
+  const int64_t n = a.x.size(0), v = a.x.size(1), c = a.x.size(2);
+  const int64_t parts = (v + kRows - 1) / kRows;
+  Scratch<T> sums(static_cast<size_t>(n * parts * c));
+  T* of_parts = sums.data();
+  parallel_for(n * parts, row_grain(kRows * c), [&](int64_t from, int64_t to) HWY_ATTR {
+    for (int64_t k = from; k < to; ++k) {
+      const int64_t item = k / parts, first = k % parts * kRows;
+      elain_grad_part(a, item * v + first, std::min(kRows, v - first), a.share.data<T>() + item * c,
+                      of_parts + k * c);
+    }
+  });
+  for (int64_t item = 0; item < n; ++item)
+    add_parts(of_parts + item * parts * c, parts, c, c,
+              [&](int64_t i) { return a.g_share.data<T>() + item * c + i; });
+}
+
 }  // namespace
 
 void modulate(const ModulateArgs& args) {
@@ -217,6 +285,14 @@ void modulate_grad(const ModulateGradArgs& args) {
   dispatch(args.out.dtype(), [&](auto zero) HWY_ATTR { modulate_grad_of<decltype(zero)>(args); });
 }
 
+void elain(const ElainArgs& args) {
+  dispatch(args.out.dtype(), [&](auto zero) HWY_ATTR { elain_of<decltype(zero)>(args); });
+}
+
+void elain_grad(const ElainGradArgs& args) {
+  dispatch(args.gy.dtype(), [&](auto zero) HWY_ATTR { elain_grad_of<decltype(zero)>(args); });
+}
+
 }  // namespace restage::cpu::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
@@ -224,5 +300,7 @@ HWY_AFTER_NAMESPACE();
 namespace restage::cpu {
 RESTAGE_KERNEL(modulate, ModulateArgs)
 RESTAGE_KERNEL(modulate_grad, ModulateGradArgs)
+RESTAGE_KERNEL(elain, ElainArgs)
+RESTAGE_KERNEL(elain_grad, ElainGradArgs)
 }  // namespace restage::cpu
 #endif

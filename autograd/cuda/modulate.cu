@@ -1,5 +1,4 @@
-// A scale and a shift of every channel that are affine functions of a point's coordinates
-// (kernels/modulate.h).
+// Scales and shifts of every channel that change from point to point (kernels/modulate.h).
 #include "autograd/cuda/kernels.h"
 #include "autograd/cuda/sums.h"
 
@@ -109,11 +108,61 @@ void modulate_grad_of(const ModulateGradArgs& a) {
   if (a.g_mesh != nullptr) mesh_grad<T>(a, g);
 }
 
+template <class T>
+void elain_of(const ElainArgs& a) {
+  const int64_t v = a.x.size(1), c = a.x.size(2);
+  const T *x = at<T>(a.x), *unit = at<T>(a.unit), *gamma = at<T>(a.gamma), *beta = at<T>(a.beta),
+          *share = at<T>(a.share);
+  T* out = at<T>(a.out);
+  const auto slope = static_cast<T>(a.slope);
+  rows(a.x.size(0) * v, c, [=] RESTAGE_DEVICE(int64_t r, int64_t i) {
+    const int64_t k = r * c + i;
+    const T s = share[r / v * c + i];
+    const T y = s * (gamma[k] * unit[k] + beta[k]) + (unit[k] + x[k] - s * x[k]);
+    out[k] = y > 0 ? y : slope * y;
+  });
+}
+
+template <class T>
+void elain_grad_of(const ElainGradArgs& a) {
+  const int64_t n = a.x.size(0), v = a.x.size(1), c = a.x.size(2);
+  const T *x = at<T>(a.x), *unit = at<T>(a.unit), *gamma = at<T>(a.gamma), *beta = at<T>(a.beta),
+          *share = at<T>(a.share), *gy = at<T>(a.gy);
+  T *g_x = at<T>(a.g_x), *g_unit = at<T>(a.g_unit), *g_gamma = at<T>(a.g_gamma),
+    *g_beta = at<T>(a.g_beta), *g_share = at<T>(a.g_share);
+  const auto slope = static_cast<T>(a.slope);
+  const auto before = [=] RESTAGE_DEVICE(int64_t r,
+                                         int64_t i) {  // the gradient before the activation
+    const int64_t k = r * c + i;
+    const T s = share[r / v * c + i];
+    const T y = s * (gamma[k] * unit[k] + beta[k]) + (unit[k] + x[k] - s * x[k]);
+    return y > 0 ? gy[k] : slope * gy[k];
+  };
+  rows(n * v, c, [=] RESTAGE_DEVICE(int64_t r, int64_t i) {
+    const int64_t k = r * c + i;
+    const T g = before(r, i), of_asked = g * share[r / v * c + i];
+    g_x[k] = g - of_asked;
+    g_unit[k] = of_asked * gamma[k] + g;
+    g_gamma[k] = of_asked * unit[k];
+    g_beta[k] = of_asked;
+  });
+  sums(
+      a.g_share, n, v, c,
+      [=] RESTAGE_DEVICE(int64_t o, int64_t p, int64_t i) {
+        const int64_t r = o * v + p, k = r * c + i;
+        return static_cast<double>(before(r, i) * (gamma[k] * unit[k] + beta[k] - x[k]));
+      },
+      [=] RESTAGE_DEVICE(int64_t k, double total) { g_share[k] = static_cast<T>(total); });
+}
+
 }  // namespace
 
 void modulate(const ModulateArgs& args) { RESTAGE_FLOATS(args.out.dtype(), modulate_of, args) }
 void modulate_grad(const ModulateGradArgs& args) {
   RESTAGE_FLOATS(args.out.dtype(), modulate_grad_of, args)
 }
+
+void elain(const ElainArgs& args) { RESTAGE_FLOATS(args.out.dtype(), elain_of, args) }
+void elain_grad(const ElainGradArgs& args) { RESTAGE_FLOATS(args.gy.dtype(), elain_grad_of, args) }
 
 }  // namespace restage::cuda

@@ -67,6 +67,12 @@ Var sinkhorn_reference(const Var& kernel, int steps, double epsilon) {
   return a * kernel * reshape(b, {n, 1, p});
 }
 
+Var elain_reference(const Var& x, const Var& unit, const Var& gamma, const Var& beta,
+                    const Var& share, double slope) {
+  const Var s = reshape(share, {share.size(0), 1, share.size(1)});
+  return leaky_relu(s * (gamma * unit + beta) + unit + add_scalar(neg(s), 1) * x, slope);
+}
+
 Var cross_attention_reference(const Var& q, const Var& k, const Var& v, double factor) {
   const Var product = matmul(q, k, false, true);
   return matmul(softmax(factor == 1 ? product : scale(product, factor)), v);

@@ -21,6 +21,8 @@ Var pooled_norm_reference(const Var& x, const Var& weight, const Var& bias, cons
 Var modulate_reference(const Var& x, const Var& mesh, const Var& scale, const Var& scale_bias,
                        const Var& shift, const Var& shift_bias,
                        Activation activation = Activation::none);
+Var elain_reference(const Var& x, const Var& unit, const Var& gamma, const Var& beta,
+                    const Var& share, double slope);
 Var sinkhorn_reference(const Var& kernel, int steps, double epsilon);
 /// Holds all scores at once.
 Var cross_attention_reference(const Var& q, const Var& k, const Var& v, double factor = 1);

@@ -45,6 +45,8 @@
   K(pooled_norm_grad, PooledNormGradArgs)                 \
   K(modulate, ModulateArgs)                               \
   K(modulate_grad, ModulateGradArgs)                      \
+  K(elain, ElainArgs)                                     \
+  K(elain_grad, ElainGradArgs)                            \
   K(gru, GruArgs)                                         \
   K(gru_grad, GruGradArgs)                                \
   K(recurrence, RecurrenceArgs)                           \

@@ -1,5 +1,5 @@
-// A scale and a shift of every channel that are affine functions of a point's coordinates: SPAdaIN
-// without its norm.
+// Scales and shifts of every channel that change from point to point: affine functions of a point's
+// coordinates (SPAdaIN without its norm), or any (ElaIN without its norm and products).
 #pragma once
 
 #include "autograd/kernels/kernel.h"
@@ -36,6 +36,33 @@ struct ModulateGradArgs {
   Tensor& g_shift;
   Tensor& g_shift_bias;
   Activation activation;
+};
+
+/// out = leaky(share (gamma unit + beta) + unit + (1 - share) x), leaky(y) being slope y for y of 0
+/// or less. x, unit, gamma, beta [n, v, c]; share [n, c].
+struct ElainArgs {
+  const Tensor& x;
+  const Tensor& unit;
+  const Tensor& gamma;
+  const Tensor& beta;
+  const Tensor& share;
+  Tensor& out;
+  double slope;
+};
+/// Gradients of all five.
+struct ElainGradArgs {
+  const Tensor& x;
+  const Tensor& unit;
+  const Tensor& gamma;
+  const Tensor& beta;
+  const Tensor& share;
+  const Tensor& gy;
+  Tensor& g_x;
+  Tensor& g_unit;
+  Tensor& g_gamma;
+  Tensor& g_beta;
+  Tensor& g_share;
+  double slope;
 };
 
 }  // namespace restage

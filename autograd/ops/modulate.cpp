@@ -30,4 +30,27 @@ Grads Modulate::backward(const Saved& s, const Tensor& gy, Needs needs) const {
   return g;
 }
 
+void ElainMix::check(Inputs x) const {
+  if (x[0].rank() != 3) shape_error(name, letters, x, "needs three axes");
+  for (size_t k = 1; k < 4; ++k)
+    if (x[k].shape() != x[0].shape()) shape_error(name, letters, x, "shapes must agree");
+  if (x[4].shape() != Shape{x[0].size(0), x[0].size(2)})
+    shape_error(name, letters, x, "n and c must agree");
+  require_floats(name, letters, x);
+}
+
+Tensor ElainMix::forward(Inputs x, Saved& saved) const {
+  Tensor y = empty_like(x[0]);
+  launch(ElainArgs{x[0], x[1], x[2], x[3], x[4], y, slope});
+  saved.keep({x[0], x[1], x[2], x[3], x[4]});
+  return y;
+}
+
+Grads ElainMix::backward(const Saved& s, const Tensor& gy, Needs) const {
+  Grads g;
+  for (size_t k = 0; k < 5; ++k) g.push_back(empty_like(s[k]));
+  launch(ElainGradArgs{s[0], s[1], s[2], s[3], s[4], gy, g[0], g[1], g[2], g[3], g[4], slope});
+  return g;
+}
+
 }  // namespace restage

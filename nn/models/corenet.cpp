@@ -5,6 +5,7 @@
 
 #include "autograd/ops/elementwise.h"
 #include "autograd/ops/layout.h"
+#include "autograd/ops/modulate.h"
 #include "autograd/ops/norm.h"
 #include "autograd/ops/reduce.h"
 #include "nn/layers/transport.h"
@@ -22,9 +23,6 @@ Var unit_channels(const Var& x) {
   const Var length = add_scalar(smooth_length(x, 1e-24), std::numeric_limits<double>::epsilon());
   return x / reshape(length, {x.size(0), x.size(1), 1});
 }
-
-/// [n, c] as [n, 1, c].
-Var of_all_points(const Var& x) { return reshape(x, {x.size(0), 1, x.size(1)}); }
 
 }  // namespace
 
@@ -113,9 +111,8 @@ Var Elain::through_same(Context& ctx, const Linear& of, const Var& x) const {
 Var Elain::operator()(Context& ctx, const Normalised& x, const WithMean& identity) const {
   const ModuleScope path(scope);
   const Var share = mix(ctx, concat({same(ctx, identity.mean), x.mean}, 1));
-  const Var asked =
-      x.unit * through_same(ctx, gamma, identity.x) + through_same(ctx, beta, identity.x);
-  return of_all_points(share) * asked + x.unit + of_all_points(add_scalar(neg(share), 1)) * x.x;
+  return elain(x.x, x.unit, through_same(ctx, gamma, identity.x),
+               through_same(ctx, beta, identity.x), share, kLeak);
 }
 
 void Elain::visit(Fields& f) {
@@ -136,9 +133,9 @@ ElainBlock::ElainBlock(int64_t channels, int64_t identity, const Init& init)
 Var ElainBlock::operator()(Context& ctx, const Var& x, const WithMean& identity) {
   const ModuleScope path(scope);
   const Normalised own(x);
-  const Normalised h(c0(ctx, leaky_relu(n0(ctx, own, identity), kLeak)));
-  const Var past = cs(ctx, leaky_relu(ns(ctx, own, identity), kLeak));
-  return past + c1(ctx, leaky_relu(n1(ctx, h, identity), kLeak));
+  const Normalised h(c0(ctx, n0(ctx, own, identity)));
+  const Var past = cs(ctx, ns(ctx, own, identity));
+  return past + c1(ctx, n1(ctx, h, identity));
 }
 
 void ElainBlock::visit(Fields& f) {

@@ -28,6 +28,7 @@ namespace {
 using gradcheck::Args;
 using gradcheck::attention_pool_reference;
 using gradcheck::Build;
+using gradcheck::elain_reference;
 using gradcheck::evaluate;
 using gradcheck::Evaluation;
 using gradcheck::gru_reference;
@@ -295,6 +296,17 @@ TEST(FusedOps, ModulateIsItsReference) {
            random({c, 3}, 5), random({c}, 6)},
           [=](Args x) { return modulate(x[0], x[1], x[2], x[3], x[4], x[5], act); },
           [=](Args x) { return modulate_reference(x[0], x[1], x[2], x[3], x[4], x[5], act); });
+}
+
+TEST(FusedOps, ElainIsItsReference) {
+  for (const double slope : {1.0, 0.2})
+    for (const auto& [n, v, c] :
+         {std::array<int64_t, 3>{1, 3, 2}, {3, 40, 33}, {2, 300, 70}, {2, 290, 16}})
+      expect_fused(
+          {random({n, v, c}, 1), random({n, v, c}, 2), random({n, v, c}, 3), random({n, v, c}, 4),
+           random({n, c}, 5)},
+          [=](Args x) { return elain(x[0], x[1], x[2], x[3], x[4], slope); },
+          [=](Args x) { return elain_reference(x[0], x[1], x[2], x[3], x[4], slope); });
 }
 
 TEST(FusedOps, SinkhornIsItsReference) {

@@ -262,6 +262,7 @@ TEST(SavedTensors, AreThoseOfTheTable) {
       {"batch_norm", "x0 24 24 x1"},  // means and deviations
       {"layer_norm", "x0 40 40 x1"},
       {"instance_norm", "x0 48 48"},
+      {"elain", "x0 x1 x2 x3 x4"},
       {"modulate", "x0 x1 x2 x3 x4 x5"},
       {"pooled_norm", "240 x1 x3 32 64 32 y"},  // x less its mean, deviations, peaks and where
       {"gru", "x0 x1 x2 x3 y 576"},             // the gates
