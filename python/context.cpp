@@ -43,6 +43,10 @@ Context& PyContext::live() const {
 PyVar PyContext::leaf(const PyParameter& p) const {
   Context& ctx = live();
   if (unrecorded() || ctx.tape == nullptr || ctx.frozen) return {Var(p->value), nullptr, 0};
+  if (members_ != nullptr && ctx.training && !members_->contains(p->id))
+    throw ShapeError("ctx.leaf: a parameter " + p->value.shape().str() +
+                     " belongs to no attribute of the network, so it would never be trained; make "
+                     "layers and parameters in __init__");
   if (!tape_) return {ctx.bind(*p), nullptr, 0};
   const py::gil_scoped_release released;
   const std::lock_guard<std::recursive_mutex> lock(recording());

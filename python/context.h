@@ -2,6 +2,7 @@
 #pragma once
 
 #include <memory>
+#include <unordered_set>
 
 #include "python/engine.h"
 
@@ -11,8 +12,9 @@ namespace restage::python {
 class PyContext {
  public:
   using Bound = void;
-  /// One of a call, until end().
-  explicit PyContext(Context* of) : of_(of) {}
+  /// One of a call of a network that has these parameters, by identity; until end().
+  PyContext(Context* of, const std::unordered_set<uint64_t>* members)
+      : of_(of), members_(members) {}
   PyContext(std::shared_ptr<PyTape> tape, bool training, uint64_t seed, uint64_t step);
   void end() { of_ = nullptr; }
   /// ShapeError where the call is over.
@@ -23,7 +25,8 @@ class PyContext {
  private:
   Context own_;
   Context* of_;
-  std::shared_ptr<PyTape> tape_;  ///< null: a tape of C++, or none
+  const std::unordered_set<uint64_t>* members_ = nullptr;  ///< null: any parameter may be used
+  std::shared_ptr<PyTape> tape_;                           ///< null: a tape of C++, or none
 };
 
 /// How many calls of networks in Python this thread is in.

@@ -4,6 +4,7 @@
 #include <atomic>
 #include <memory>
 #include <string>
+#include <unordered_set>
 #include <variant>
 #include <vector>
 
@@ -95,6 +96,7 @@ class OwnObject : public OwnTraining {
   std::string name_, kind_;
   Held instance_;
   std::vector<Member> members_;
+  std::unordered_set<uint64_t> parameters_;  // identities of all
   bool has_loss_ = false, changes_ = false;
   mutable std::atomic<bool> told_nan_ = false;
 };

@@ -37,8 +37,9 @@ py::object input_of(const NamedVars& values, const std::vector<Var>* state) {
 /// A Context of C++ in the hands of Python, for one call.
 class Lent {
  public:
-  explicit Lent(Context& ctx)
-      : lent_(std::make_shared<PyContext>(&ctx)), before_(std::exchange(unrecorded(), false)) {
+  Lent(Context& ctx, const std::unordered_set<uint64_t>& members)
+      : lent_(std::make_shared<PyContext>(&ctx, &members)),
+        before_(std::exchange(unrecorded(), false)) {
     ++networks_running();
   }
   ~Lent() {
@@ -80,8 +81,11 @@ OwnObject::OwnObject(std::string name, std::string kind, const py::tuple& made)
     if (py::isinstance<Parameter>(value)) {
       member.parameter = value.cast<PyParameter>();
       member.parameter->value = member.parameter->value.cast(DType::f32);
+      parameters_.insert(member.parameter->id);
     } else if (py::isinstance<PyModel>(value)) {
       member.child = value.cast<const PyModel&>().net;
+      for (const Parameter* of_child : parameters_of(*member.child))
+        parameters_.insert(of_child->id);
     } else {
       member.buffer = &value.cast<Tensor&>();
     }
@@ -105,7 +109,7 @@ void OwnObject::visit_members(Fields& fields) {
 py::object OwnObject::answer(Context& ctx, const NamedVars& input,
                              const std::vector<Var>* state) const {
   const ModuleScope path(name_);
-  const Lent lent(ctx);
+  const Lent lent(ctx, parameters_);
   const uint64_t masks = ctx.masks;
   return in_python("forward", [&] {
     ctx.masks = masks;
@@ -116,7 +120,7 @@ py::object OwnObject::answer(Context& ctx, const NamedVars& input,
 Var OwnObject::loss(Context& ctx, const NamedVars& input, const NamedVars& batch) const {
   const py::gil_scoped_acquire acquired;
   const ModuleScope path(name_);
-  const Lent lent(ctx);
+  const Lent lent(ctx, parameters_);
   const uint64_t masks = ctx.masks;
   const py::object given = in_python("loss", [&] {
     ctx.masks = masks;

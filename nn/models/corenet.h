@@ -69,7 +69,7 @@ struct Normalised : WithMean {
   Var unit;  ///< (x - mean) / s, with the unbiased deviation s
 };
 
-/// Elastic instance normalisation: unit (1 + G) + B, with scale and shift between what the
+/// Elastic instance normalisation and a leaky ReLU: unit (1 + G) + B before it, with scale and shift between what the
 /// identity's features ask for, gamma and beta, and x's own deviation s and mean m:
 ///   G = share gamma + (1 - share) s,   B = share beta + (1 - share) m,   share = mix(same f, m).
 /// Since s unit + m is x itself, that is share (unit gamma + beta) + unit + (1 - share) x. gamma

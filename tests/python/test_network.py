@@ -302,6 +302,17 @@ def test_a_shape_that_does_not_fit_is_told():
         restage.ops.relu(restage.Parameter(np.ones(1)))
 
 
+def test_a_layer_that_forward_makes_is_refused(tmp_path):
+    @restage.model("tiny/late", role="motion")
+    class Late(own_networks.Turns):
+        def forward(self, ctx, x):
+            out = super().forward(ctx, x)
+            return dict(out, trans=layers.Linear(3, 3)(ctx, out["trans"]))
+
+    with pytest.raises(restage.ShapeError, match=r"ctx\.leaf: a parameter \[3, 3\] belongs to no attribute of the network"):
+        restage.train(configuration(tmp_path, "motion", "tiny/late"))
+
+
 def test_an_answer_without_parameters_is_told(tmp_path):
     @restage.model("tiny/arrays", role="motion")
     class Arrays(own_networks.Turns):
@@ -310,6 +321,18 @@ def test_an_answer_without_parameters_is_told(tmp_path):
 
     with pytest.raises(restage.ShapeError, match=r"tiny/arrays: forward\(\)'s result depends on no parameter; use ctx\.leaf"):
         restage.train(configuration(tmp_path, "motion", "tiny/arrays"))
+
+
+def test_a_figure_that_is_nan_is_told_once(tmp_path, capfd):
+    @restage.model("tiny/unknown", role="motion")
+    class Unknown(own_networks.Turns):
+        figures = ("feet",)
+
+        def validate(self, measured):
+            return {"feet": float("nan")}
+
+    restage.train(configuration(tmp_path, "motion", "tiny/unknown"))
+    assert capfd.readouterr().err.count("tiny/unknown: validate() gave nan for 'feet'") == 1
 
 
 @pytest.mark.parametrize("figures, given, says", [
