@@ -7,14 +7,24 @@ import os
 import pathlib
 import shutil
 import subprocess
+import sys
 import tempfile
 
 import pytest
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 PROGRAM = os.environ.get("RESTAGE_PROGRAM", str(ROOT / "build/release/restage"))
-os.environ.pop("LD_PRELOAD", None)  # a sanitizer for this process (tests/CMakeLists.txt), not for the programs it starts
+# A sanitizer for processes that import the module (tests/CMakeLists.txt). Programs have their own.
+SANITIZER = os.environ.pop("LD_PRELOAD", None)
 LITE, STANDARD = (str(ROOT / "experiments/weights" / f"{name}.safetensors") for name in ("lite", "standard"))
+
+
+def python(*words, env=None, **options):
+    """A process of Python that imports the module; what it says is kept. Options are those of subprocess.run."""
+    env = dict(os.environ if env is None else env)
+    if SANITIZER:
+        env["LD_PRELOAD"] = SANITIZER
+    return subprocess.run([sys.executable, *map(str, words)], env=env, capture_output=True, **options)
 
 
 class Program:

@@ -2,7 +2,6 @@
 import copy
 import os
 import signal
-import subprocess
 import sys
 import threading
 import time
@@ -12,7 +11,7 @@ import pytest
 import restage
 from restage import data
 
-from conftest import LITE
+from conftest import LITE, python
 
 @pytest.fixture(scope="module")
 def corpus(program):
@@ -182,7 +181,7 @@ def test_ctrl_c_while_a_batch_is_drawn(corpus):
 
 def test_a_program_that_stops_in_the_middle(corpus):
     script = "import restage.data\nb = restage.data.clouds(%r, batch=8, ahead=8)\nnext(b)\n" % corpus
-    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=120)
+    done = python("-c", script, text=True, timeout=120)
     assert (done.returncode, done.stderr) == (0, "")
 
 

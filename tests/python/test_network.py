@@ -6,7 +6,6 @@ import signal
 import socket
 import struct
 import subprocess
-import sys
 
 import numpy as np
 import pytest
@@ -14,7 +13,7 @@ import restage
 from restage import layers, ops
 
 import own_networks
-from conftest import LITE, PROGRAM, ROOT
+from conftest import LITE, PROGRAM, ROOT, python
 
 NETWORKS = ROOT / "tests/python/own_networks.py"
 TINY = """run_root: {folder}
@@ -52,8 +51,7 @@ def same(a, b):
 
 def program(*words, cwd=None):
     """python3 -m restage in a process of its own."""
-    return subprocess.run([sys.executable, "-m", "restage", *map(str, words)], cwd=cwd, capture_output=True, text=True,
-                          timeout=300)
+    return python("-m", "restage", *words, cwd=cwd, text=True, timeout=300)
 
 
 # ---- the network itself ----
@@ -379,8 +377,8 @@ def test_a_weights_file_names_the_module_and_runs_nothing(trained, tmp_path):
     net = restage.load_model(trained, "motion")
     assert net.name == "tiny/turns" and net.own is not None
     script = "import restage, sys\ntry: restage.load_model(sys.argv[1], 'motion')\nexcept restage.InputError as e: print(e)"
-    result = subprocess.run([sys.executable, "-c", script, trained], capture_output=True, text=True,
-                            env={**os.environ, "PYTHONPATH": os.environ["PYTHONPATH"] + ":" + str(NETWORKS.parent)})
+    result = python("-c", script, trained, text=True,
+                    env={**os.environ, "PYTHONPATH": os.environ["PYTHONPATH"] + ":" + str(NETWORKS.parent)})
     assert "needs the network 'tiny/turns', which the Python module 'own_networks' defines; import that module first" in result.stdout
     result = subprocess.run([PROGRAM, "weights", "export", "--source", trained, "--model", "motion", "--out", tmp_path / "m"], capture_output=True, text=True)
     assert result.returncode == 2 and "--python FILE.py" in result.stderr and result.stderr.count("\n") == 1
@@ -406,8 +404,8 @@ def test_it_runs_in_a_stream(trained, walk):
         receiver.bind(("127.0.0.1", 0))
         clouds = restage.load_clouds(walk / "source.h5")
         frames = b"".join(struct.pack("<Id", len(c), k / 30) + c.tobytes() for k, c in enumerate(clouds))
-        result = subprocess.run([sys.executable, "-m", "restage", "stream", "-", walk / "target.ply", "--vmc",
-                                 f"127.0.0.1:{receiver.getsockname()[1]}", "--weights", trained, "--python", NETWORKS,
-                                 "--force", "--json"], input=frames, capture_output=True, timeout=120)
+        result = python("-m", "restage", "stream", "-", walk / "target.ply", "--vmc",
+                        f"127.0.0.1:{receiver.getsockname()[1]}", "--weights", trained, "--python", NETWORKS,
+                        "--force", "--json", input=frames, timeout=120)
     assert result.returncode == 0, result.stderr
     assert json.loads(result.stdout)["frames_in"] == len(clouds)

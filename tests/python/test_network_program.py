@@ -7,7 +7,7 @@ import sys
 import pytest
 import restage
 
-from conftest import LITE, PROGRAM
+from conftest import LITE, PROGRAM, python
 from test_network import NETWORKS, configuration, program
 
 
@@ -112,7 +112,7 @@ def test_a_file_that_has_moved_is_given_again(tmp_path):
 def test_a_script_is_named_by_its_file(tmp_path):
     (tmp_path / "script.py").write_text(NETWORKS.read_text() + "\nrestage.train(__import__('sys').argv[1])\n")
     config = configuration(tmp_path, "motion", "tiny/turns")
-    subprocess.run([sys.executable, tmp_path / "script.py", config], check=True, capture_output=True)
+    python(tmp_path / "script.py", config, check=True)
     run = next(tmp_path.glob("t-*"))
     result = program("weights", "export", "--source", run, "--model", "motion", "--out", tmp_path / "m")
     assert result.returncode == 2 and "the file 'script.py' defines" in result.stderr

@@ -1,14 +1,12 @@
 """docs/python_reference.md is what its generator writes, and names all that the package has."""
-import subprocess
-import sys
 
 import restage
 
-from conftest import ROOT
+from conftest import ROOT, python
 
 
 def test_the_page_is_up_to_date():
-    done = subprocess.run([sys.executable, str(ROOT / "docs/make_python_reference.py"), "--check"], capture_output=True, text=True, timeout=300)
+    done = python(ROOT / "docs/make_python_reference.py", "--check", text=True, timeout=300)
     assert done.returncode == 0, done.stdout + done.stderr
 
 
