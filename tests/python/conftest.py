@@ -45,6 +45,13 @@ class Program:
         return json.loads(self.done(*words, "--json"))
 
 
+@pytest.fixture
+def sanitized_children(monkeypatch):
+    """Processes that multiprocessing starts import the module, too."""
+    if SANITIZER:
+        monkeypatch.setenv("LD_PRELOAD", SANITIZER)
+
+
 @pytest.fixture(scope="session", autouse=True)
 def cache():
     """Checksums that the program keeps stay out of the user's folder."""

@@ -300,7 +300,7 @@ def joints_in_another_process(extractor, cloud):
     return extractor(cloud)[0]
 
 
-def test_copies_of_extractors(walk, tmp_path, monkeypatch):
+def test_copies_of_extractors(walk, tmp_path, monkeypatch, sanitized_children):
     cloud = restage.load_clouds(walk / "source.h5")[0]
     shutil.copy(LITE, tmp_path / "mine.safetensors")
     monkeypatch.chdir(tmp_path)
