@@ -247,7 +247,7 @@ void elain_grad_part(const ElainGradArgs& a, int64_t first, int64_t rows, const 
       const Mixed mixed(x, unit, gamma, load(a.beta), s);
       const auto g = hn::IfThenElse(hn::Gt(mixed.out, zero), gy, hn::Mul(gy, slope));
       const auto of_asked = hn::Mul(g, s);
-      hn::StoreU(hn::Sub(g, of_asked), d, a.g_x.data<T>() + at);
+      hn::StoreU(hn::Sub(g, of_asked), d, a.out.data<T>() + at);
       hn::StoreU(hn::MulAdd(of_asked, gamma, g), d, a.g_unit.data<T>() + at);
       hn::StoreU(hn::Mul(of_asked, unit), d, a.g_gamma.data<T>() + at);
       hn::StoreU(of_asked, d, a.g_beta.data<T>() + at);
@@ -290,7 +290,7 @@ void elain(const ElainArgs& args) {
 }
 
 void elain_grad(const ElainGradArgs& args) {
-  dispatch(args.gy.dtype(), [&](auto zero) HWY_ATTR { elain_grad_of<decltype(zero)>(args); });
+  dispatch(args.out.dtype(), [&](auto zero) HWY_ATTR { elain_grad_of<decltype(zero)>(args); });
 }
 
 }  // namespace restage::cpu::HWY_NAMESPACE

@@ -128,7 +128,7 @@ void elain_grad_of(const ElainGradArgs& a) {
   const int64_t n = a.x.size(0), v = a.x.size(1), c = a.x.size(2);
   const T *x = at<T>(a.x), *unit = at<T>(a.unit), *gamma = at<T>(a.gamma), *beta = at<T>(a.beta),
           *share = at<T>(a.share), *gy = at<T>(a.gy);
-  T *g_x = at<T>(a.g_x), *g_unit = at<T>(a.g_unit), *g_gamma = at<T>(a.g_gamma),
+  T *g_x = at<T>(a.out), *g_unit = at<T>(a.g_unit), *g_gamma = at<T>(a.g_gamma),
     *g_beta = at<T>(a.g_beta), *g_share = at<T>(a.g_share);
   const auto slope = static_cast<T>(a.slope);
   const auto before = [=] RESTAGE_DEVICE(int64_t r,
@@ -163,6 +163,6 @@ void modulate_grad(const ModulateGradArgs& args) {
 }
 
 void elain(const ElainArgs& args) { RESTAGE_FLOATS(args.out.dtype(), elain_of, args) }
-void elain_grad(const ElainGradArgs& args) { RESTAGE_FLOATS(args.gy.dtype(), elain_grad_of, args) }
+void elain_grad(const ElainGradArgs& args) { RESTAGE_FLOATS(args.out.dtype(), elain_grad_of, args) }
 
 }  // namespace restage::cuda

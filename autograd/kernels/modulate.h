@@ -49,7 +49,7 @@ struct ElainArgs {
   Tensor& out;
   double slope;
 };
-/// Gradients of all five.
+/// Gradients of all five; out is that of x.
 struct ElainGradArgs {
   const Tensor& x;
   const Tensor& unit;
@@ -57,7 +57,7 @@ struct ElainGradArgs {
   const Tensor& beta;
   const Tensor& share;
   const Tensor& gy;
-  Tensor& g_x;
+  Tensor& out;
   Tensor& g_unit;
   Tensor& g_gamma;
   Tensor& g_beta;
