@@ -321,18 +321,6 @@ def test_an_answer_without_parameters_is_told(tmp_path):
         restage.train(configuration(tmp_path, "motion", "tiny/arrays"))
 
 
-def test_a_figure_that_is_nan_is_told_once(tmp_path, capfd):
-    @restage.model("tiny/unknown", role="motion")
-    class Unknown(own_networks.Turns):
-        figures = ("feet",)
-
-        def validate(self, measured):
-            return {"feet": float("nan")}
-
-    restage.train(configuration(tmp_path, "motion", "tiny/unknown"))
-    assert capfd.readouterr().err.count("tiny/unknown: validate() gave nan for 'feet'") == 1
-
-
 @pytest.mark.parametrize("figures, given, says", [
     (["feet"], {"feet": "x"}, r"validate\(\) gave 'x' for 'feet', which is no number"),
     (["feet"], {"feet": 1, "hands": 2}, r"validate\(\) gave 'hands', which 'figures' does not name"),

@@ -62,6 +62,20 @@ def test_the_program_tells_where_a_call_failed(tmp_path, old, new, says):
     assert result.returncode == 1 and last.startswith("restage: file/turns: forward() failed: ") and says in last
 
 
+def test_a_figure_that_is_nan_is_told_once(tmp_path):
+    (tmp_path / "mine.py").write_text(NETWORKS.read_text().replace('"tiny/', '"file/') + """
+
+@restage.model("file/unknown", role="motion")
+class Unknown(Turns):
+    figures = ("feet",)
+
+    def validate(self, measured):
+        return {"feet": float("nan")}
+""")
+    result = program("train", configuration(tmp_path, "motion", "file/unknown", more="python: [mine.py]\n"))
+    assert result.returncode == 0 and result.stderr.count("file/unknown: validate() gave nan for 'feet'") == 1, result.stderr
+
+
 def test_a_changed_source_does_not_go_on(tmp_path):
     mine = tmp_path / "mine.py"
     mine.write_text(NETWORKS.read_text().replace('"tiny/', '"file/'))
