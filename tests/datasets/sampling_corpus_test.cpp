@@ -1,6 +1,7 @@
 // Corpora: splits never mix, empty splits are errors, checksums notice every change. And what lets
 // a training stop, resume and run for days: a sample is a function of seed and index alone, on any
 // number of threads and in any batch, and drawing an epoch of them leaves nothing behind.
+#include "datasets/builtin/bodies.h"
 #include "datasets/corpus.h"
 
 #include <gtest/gtest.h>
@@ -79,6 +80,7 @@ TEST_F(SamplingCorpus, BuiltinIsTheSameForEverySplitAloneAndTogether) {
   source.bodies = {1, 1, 0};
   source.motions = {2, 1, 0};
   const Corpus all = load_corpus(source);
+  EXPECT_EQ(all.license, kBuiltinLicense);
   EXPECT_EQ(all.bodies.size(), 2u);
   EXPECT_EQ(all.motions.size(), 3u);
   EXPECT_FALSE(all.license.empty());
