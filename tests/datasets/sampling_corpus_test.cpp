@@ -1,7 +1,6 @@
 // Corpora: splits never mix, empty splits are errors, checksums notice every change. And what lets
 // a training stop, resume and run for days: a sample is a function of seed and index alone, on any
 // number of threads and in any batch, and drawing an epoch of them leaves nothing behind.
-#include "datasets/builtin/bodies.h"
 #include "datasets/corpus.h"
 
 #include <gtest/gtest.h>
@@ -11,6 +10,7 @@
 #include <memory>
 #include <set>
 
+#include "datasets/builtin/bodies.h"
 #include "datasets/sampling/clouds.h"
 #include "datasets/sampling/evaluation.h"
 #include "datasets/sampling/pairs.h"
