@@ -41,7 +41,7 @@ def write_glb(path, vertices, faces, names, parents, heads, weights, indices, no
         primitives.append({"attributes": attributes, "indices": add([[i] for face in some for i in face], "I", "SCALAR", 5125)})
         if name:
             primitives[-1]["material"] = len(materials)
-            materials.append({"name": name, "pbrMetallicRoughness": {
+            materials.append({"name": name, "doubleSided": True, "pbrMetallicRoughness": {
                 "baseColorFactor": list(colour) + [1], "metallicFactor": 0, "roughnessFactor": 0.9}})
     inverse = add([[1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, -x, -y, -z, 1] for x, y, z in heads], "f", "MAT4", 5126)
 

@@ -67,10 +67,11 @@ def pieces(faces, count):
 
 
 def has_hair(vertices, joints):
-    """Which vertices of the skin lie on the scalp: above the forehead, and behind the ears down to the neck."""
+    """Which vertices of the skin lie on the scalp: above forehead and ears, and behind them down to the neck."""
     head, top = joints[HEAD], vertices[:, 1].max()
-    up, front = (vertices[:, 1] - head[1]) / (top - head[1]), (vertices[:, 2] - head[2]) / (top - head[1])
-    return (up > -0.2) & (np.abs(vertices[:, 0]) < top - head[1]) & ((up > 0.72 + 0.25 * front) & (front < 0.45) | (front < -0.1) & (up > 0.1))
+    side, up, front = np.moveaxis((vertices - head * [0, 1, 1]) / (top - head[1]), 1, 0)
+    ear = (np.abs(side) > 0.33) & (up < 0.42) & (np.abs(front) < 0.25)
+    return (np.abs(side) < 1) & ~ear & (up > np.select([front < -0.25, front < 0.05], [-0.1, 0.1], 0.4 + 0.7 * front))
 
 
 class People:
@@ -93,12 +94,12 @@ class People:
             return self.poses.Wardrobe.surface(file, body + ("_" + garment if garment else ""))
 
     def bare(self, body, garment):
-        """The skin without what the garment hides: a face stays while one of its vertices is to be seen, so that no gap opens at a hem."""
+        """The skin without the faces that touch what the garment hides."""
         vertices, joints, weights, faces = self.surface(body)
         hidden = self.poses.covered(os.path.join(self.data, "body", "clothes", garment + ".mhclo.gz"))
         seen = np.ones(len(vertices), bool)
         seen[hidden[hidden < len(vertices)]] = False
-        return vertices, joints, weights, faces[seen[faces].any(1)]
+        return vertices, joints, weights, faces[seen[faces].all(1)]
 
 
 def character(people, body, garment, skin, hair, cloth):
@@ -107,9 +108,12 @@ def character(people, body, garment, skin, hair, cloth):
     whole = normals_of(vertices, people.surface(body)[3])
     scalp = has_hair(vertices, joints)
     haired = scalp[faces].all(1)
-    raised = vertices + HAIR * whole * scalp[:, None]
+    edge = np.unique(faces[~haired])  # where hair ends it lies on the skin
+    thick = np.full((len(vertices), 1), HAIR)
+    thick[edge] = 0.001
+    raised = vertices + thick * whole
     worn, _, shares, sewn = people.surface(body, garment)
-    parts = [("skin", linear(skin), faces[~haired]), ("hair", linear(hair), faces[haired] + len(vertices))]
+    parts = [("skin", linear(skin), faces), ("hair", linear(hair), faces[haired] + len(vertices))]
     for k, piece in enumerate(pieces(sewn, len(worn))):
         parts.append(("cloth %d" % (k + 1), linear(cloth[min(k, len(cloth) - 1)]), piece + 2 * len(vertices)))
     vertices, weights = np.concatenate([vertices, raised, worn]), np.concatenate([weights, weights, shares])

@@ -41,15 +41,15 @@ std::string figure(const Json& row, const char* name) {
 }
 
 std::string text_of(const Json& weights, const Json& captures) {
-  std::vector<std::vector<std::string>> files = {{"weights", "joints", "MB", "for"}},
+  std::vector<std::vector<std::string>> files = {{"for", "weights", "joints", "MB"}},
                                         kinds = {
-                                            {"capture", "joints, mm", "surface, mm", "weights"}};
+                                            {"capture", "weights", "joints, mm", "surface, mm"}};
   for (const Json& row : weights)
-    files.push_back({row.at("name"), row.at("joints"),
-                     format("%.1f", 1e-6 * row.at("bytes").get<double>()), row.at("for")});
+    files.push_back({row.at("for"), row.at("name"), row.at("joints"),
+                     format("%.1f", 1e-6 * row.at("bytes").get<double>())});
   for (const Json& row : captures)
-    kinds.push_back({row.at("capture"), figure(row, "joints_mm"), figure(row, "surface_mm"),
-                     row.at("weights")});
+    kinds.push_back({row.at("capture"), row.at("weights"), figure(row, "joints_mm"),
+                     figure(row, "surface_mm")});
   return markdown_table(files) + "\n" + markdown_table(kinds) +
          "\njoints: PA-MPJPE, surface: PA-MPVD, of the open benchmark (docs/results.md); blank: "
          "measured elsewhere (docs/which_command.md, \"Which weights\") or not at all\n";
