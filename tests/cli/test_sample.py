@@ -19,7 +19,8 @@ def commands():
 
 def pixels(path):
     """Width, height and the bytes of a PNG picture of 8-bit colours without palette."""
-    data, at, packed = open(path, "rb").read(), 8, b""
+    with open(path, "rb") as file:
+        data, at, packed = file.read(), 8, b""
     while at < len(data):
         length, kind = struct.unpack_from(">I4s", data, at)
         body = data[at + 8:at + 8 + length]
