@@ -2,7 +2,7 @@
 # The shell completions and the manual page are printed by the program itself, where it can run.
 set(CPACK_PACKAGE_NAME restage)
 set(CPACK_PACKAGE_VERSION ${PROJECT_VERSION})
-set(CPACK_PACKAGE_CONTACT "Restage developers <restage@example.org>")
+set(CPACK_PACKAGE_CONTACT "Restage developers")
 set(CPACK_PACKAGE_DESCRIPTION_SUMMARY "${PROJECT_DESCRIPTION}")
 set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
 set(CPACK_GENERATOR DEB)

@@ -67,7 +67,7 @@ Corpus builtin_corpus(const CorpusSource& source, const std::string& split) {
   out.description = "built-in source, seed " + std::to_string(source.seed) +
                     ", train/validation/test bodies " + text(source.bodies) + ", motions " +
                     text(source.motions) + (source.one_mesh ? ", one mesh" : "");
-  out.license = "Apache-2.0";
+  out.license = kBuiltinLicense;
   return out;
 }
 

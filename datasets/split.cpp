@@ -120,7 +120,7 @@ Guests guests_from(const SplitOptions& options) {
   if (options.bodies == "builtin") {
     const SplitCounts count = CorpusSource().bodies;
     out.bodies = builtin_bodies(0, count.train, count.validation, count.test);
-    out.info = {"Apache-2.0", "restage's built-in bodies"};
+    out.info = {kBuiltinLicense, "restage's built-in bodies"};
     return out;
   }
   const h5::File file = open_schema_file(options.bodies);

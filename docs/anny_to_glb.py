@@ -14,9 +14,10 @@ import struct
 import sys
 
 
-def write_glb(path, vertices, faces, names, parents, heads, weights, indices):
+def write_glb(path, vertices, faces, names, parents, heads, weights, indices, normals=None, parts=None):
     """vertices V x 3, faces T x 3; names, parents (-1: none) and heads (x 3) of the bones in the pose of
-    the vertices; weights and bone indices V x K with K up to 16. Lists of lists, metres."""
+    the vertices; weights and bone indices V x K with K up to 16. Lists of lists, metres. normals V x 3, if
+    there are any. parts, for several materials instead of faces: (name, linear colour x 3, faces)."""
     binary, views, accessors = bytearray(), [], []
 
     def add(rows, code, kind, component):
@@ -33,7 +34,15 @@ def write_glb(path, vertices, faces, names, parents, heads, weights, indices):
         four = lambda rows: [(list(row[first:first + 4]) + [0] * 4)[:4] for row in rows]
         attributes["JOINTS_%d" % (first // 4)] = add(four(indices), "H", "VEC4", 5123)
         attributes["WEIGHTS_%d" % (first // 4)] = add(four(weights), "f", "VEC4", 5126)
-    triangles = add([[i] for face in faces for i in face], "I", "SCALAR", 5125)
+    if normals is not None:
+        attributes["NORMAL"] = add(normals, "f", "VEC3", 5126)
+    primitives, materials = [], []
+    for name, colour, some in parts or [(None, None, faces)]:
+        primitives.append({"attributes": attributes, "indices": add([[i] for face in some for i in face], "I", "SCALAR", 5125)})
+        if name:
+            primitives[-1]["material"] = len(materials)
+            materials.append({"name": name, "doubleSided": True, "pbrMetallicRoughness": {
+                "baseColorFactor": list(colour) + [1], "metallicFactor": 0, "roughnessFactor": 0.9}})
     inverse = add([[1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, -x, -y, -z, 1] for x, y, z in heads], "f", "MAT4", 5126)
 
     nodes = []
@@ -45,11 +54,14 @@ def write_glb(path, vertices, faces, names, parents, heads, weights, indices):
             nodes[parent].setdefault("children", []).append(bone)
     nodes.append({"name": "body", "mesh": 0, "skin": 0})
     roots = [bone for bone, parent in enumerate(parents) if parent < 0] + [len(names)]
-    text = json.dumps({
+    document = {
         "asset": {"version": "2.0", "generator": "anny_to_glb"}, "scene": 0, "scenes": [{"nodes": roots}], "nodes": nodes,
-        "meshes": [{"primitives": [{"attributes": attributes, "indices": triangles}]}],
+        "meshes": [{"primitives": primitives}],
         "skins": [{"joints": list(range(len(names))), "inverseBindMatrices": inverse}],
-        "accessors": accessors, "bufferViews": views, "buffers": [{"byteLength": len(binary)}]}).encode()
+        "accessors": accessors, "bufferViews": views, "buffers": [{"byteLength": len(binary)}]}
+    if materials:
+        document["materials"] = materials
+    text = json.dumps(document).encode()
     text += b" " * (-len(text) % 4)
     with open(path, "wb") as f:
         f.write(struct.pack("<4sII", b"glTF", 2, 28 + len(text) + len(binary)))

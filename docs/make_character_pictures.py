@@ -1,12 +1,15 @@
 #!/usr/bin/env python3
-"""Writes the pictures of characters in docs/images: characters_worst.jpg, film_*.webp and textured_scan.jpg.
+"""Writes the pictures of characters in docs/images: moving.webp (README.md), view_dance.webp, film_*.webp, characters_worst.jpg,
+character_blender.jpg, textured_scan.jpg and real_capture.webp.
 
-    python3 docs/make_character_pictures.py PROGRAM DATA_FOLDER CHARACTERS RIGS OUT [--only sheet|films|scan] [--people CLOUDS.h5]
+    python3 docs/make_character_pictures.py PROGRAM DATA_FOLDER RIGS OUT [--only readme|dance|films|sheet|blender|scan]
+      [--check FOLDER] [--people CLOUDS.h5] [--real SCAN.ply]
 
-DATA_FOLDER: MakeHuman's body and CMU's motions, as `restage data import` takes it, with cmu_more beside. CHARACTERS: a folder with
-check_rig.py, source_dance.glb and targets. RIGS: a folder of strangers' characters. They are not in this repository. Pictures are
-drawn by Blender (tests/infer/blender_picture.py), films by `restage view`. CLOUDS.h5: two people who pass each other, of whom
-film_people.webp is made (bench/README.md). Needs numpy, h5py, scipy and Pillow.
+DATA_FOLDER: MakeHuman's bodies and CMU's motions, as `restage data import` takes them, with cmu_more beside. Its dressed people are
+those of docs/make_characters.py. RIGS: a folder of strangers' characters, which are not in this repository. The sheet needs FOLDER with
+check_rig.py, which is not here either. Still pictures are drawn by Blender (tests/infer/blender_picture.py), films by `restage view`.
+CLOUDS.h5: two people who pass each other, of whom film_people.webp is made (bench/README.md). SCAN.ply: points in metres, y up, of which
+real_capture.webp is made. Needs numpy, h5py, scipy and Pillow.
 """
 import argparse
 import gzip
@@ -16,14 +19,16 @@ import sys
 import tempfile
 
 import h5py
+import make_characters
+import make_sample
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont, ImageSequence
 
 ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 BLENDER = os.path.join(ROOT, "tests", "infer", "blender_picture.py")
 # Motion, first and last frame, degrees from the front: what a film shows.
-FILMS = {"clap": ("86_09", 533, 593, -50), "hip": ("29_03", 10, 100, 20), "kick": ("135_04", 185, 245, 50), "fall": ("90_16", 85, 165, 60)}
-SHEET = ("mixa_t.glb", "mixa_a.glb", "mixa_t.fbx", "q_witch.glb", "q_spacesuit.glb", "q_knight.glb", "robot_expressive.glb")
+FILMS = {"dance": ("05_03", 0, 60, -150), "clap": ("86_09", 533, 593, -50), "hip": ("29_03", 10, 100, 20), "kick": ("135_04", 185, 245, 50), "fall": ("90_16", 85, 165, 60)}
+SHEET = ("tall", "stout", "lean", "q_witch.glb", "q_spacesuit.glb", "q_knight.glb", "robot_expressive.glb")
 FONT = "/usr/share/fonts/truetype/dejavu/DejaVuSans.ttf"
 
 
@@ -49,15 +54,19 @@ def write_words(picture, at, text, size=15):
 
 class Studio:
     def __init__(self, options, folder):
-        self.program, self.data, self.characters, self.rigs, self.out = (os.path.abspath(p) for p in (
-            options.program, options.data, options.characters, options.rigs, options.out))
-        self.folder = folder
+        self.program, self.data, self.rigs, self.out = (os.path.abspath(p) for p in (options.program, options.data, options.rigs, options.out))
+        self.folder, self.people_of_data = folder, make_characters.People(self.program, self.data, folder)
 
     def at(self, *names):
         return os.path.join(self.folder, *names)
 
     def given(self, name):
-        return next(p for p in (os.path.join(f, name) for f in (self.characters, self.rigs)) if os.path.exists(p))
+        """A stranger's character, or one of make_characters'."""
+        if name not in make_characters.CHARACTERS:
+            return os.path.join(self.rigs, name)
+        if not os.path.exists(self.at(name + ".glb")):
+            make_characters.write(self.at(name + ".glb"), *make_characters.character(self.people_of_data, *make_characters.CHARACTERS[name]))
+        return self.at(name + ".glb")
 
     def retarget(self, source, target, out, *more):
         run(self.program, "retarget", "--source", source, "--target", target, "--out", out, "--quiet", *more)
@@ -95,15 +104,51 @@ class Studio:
                 study("any_pose").write_obj(self.at("child.obj"), vertices / np.ptp(vertices[:, 1]), file["topologies"]["0"][()])
         return self.at("child.obj")
 
+    def films(self):
+        for film in ("clap", "hip", "kick", "fall"):
+            self.film(film)
+
     def film(self, film):
         azimuth = FILMS[film][3]
-        self.retarget(self.motion(film), self.given("source_dance.glb"), self.at("source.glb"), "--clip-name", film, "--contacts", "off")
+        self.performer(film)
         panels = [("source", self.at("source.glb"))]
-        for title, target in (("child, 1.0 m", self.child()), ("witch", self.given("q_witch.glb")), ("space suit", self.given("q_spacesuit.glb")),
+        for title, target in (("stout", self.given("stout")), ("child, 1.0 m", self.child()), ("witch", self.given("q_witch.glb")), ("space suit", self.given("q_spacesuit.glb")),
                               ("robot", self.given("robot_expressive.glb"))):
             panels.append((title, self.at("panel%d.glb" % len(panels))))
             self.retarget(self.at("source.glb"), target, panels[-1][1], "--clip", film, *([] if target.endswith(".obj") else ["--clip-name", "film"]))
-        self.write_film(film, panels, "190x240", azimuth)
+        self.write_film(film, panels, "160x240", azimuth)
+
+    def performer(self, film, name="short"):
+        """A character who performs a motion: source.glb."""
+        self.retarget(self.motion(film), self.given(name), self.at("source.glb"), "--clip-name", film, "--contacts", "off")
+        return self.at("source.glb")
+
+    def dance(self):
+        self.performer("dance", "lean")
+        run(self.program, "view", self.at("source.glb"), "--fps", 15, "--size", "240x320", "--azimuth", FILMS["dance"][3], "--out", os.path.join(self.out, "view_dance.webp"), "--quiet")
+
+    def beside(self, out, clouds, fps, target, *more):
+        """An animation: clouds on the left, a character on the right."""
+        self.retarget(clouds, self.given(target), self.at("character.glb"), "--fps", fps, "--clip-name", out.split(".")[0])
+        run(self.program, "view", self.at("character.glb"), "--compare", clouds, "--source-fps", fps, *more, "--out", os.path.join(self.out, out), "--quiet")
+
+    def readme(self):
+        """Clouds of a dancing person, of another build than the character that dances beside."""
+        clouds, random = self.at("clouds"), np.random.default_rng(0)
+        self.retarget(self.motion("dance"), self.given("tall"), self.at("frames"), "--format", "ply", "--contacts", "off")
+        os.makedirs(clouds, exist_ok=True)
+        for name in sorted(os.listdir(self.at("frames"))):
+            make_sample.write_cloud(os.path.join(clouds, name), make_sample.scan(*make_sample.read_ply(self.at("frames", name)), random))
+        self.beside("moving.webp", clouds, 30, "strong", "--fps", 15, "--size", "560x360", "--azimuth", FILMS["dance"][3])
+
+    def real(self, path):
+        """A scan, turned 30 times by twelve degrees."""
+        points = read_points(path)
+        os.makedirs(self.at("turned"))
+        for k in range(30):
+            turn = study("any_pose").turn((0, 1, 0), 12 * k)
+            make_sample.write_cloud(self.at("turned", "%02d.ply" % k), points @ turn.T)
+        self.beside("real_capture.webp", self.at("turned"), 10, "slim", "--fps", 10, "--size", "600x400")
 
     def people(self, clouds):
         """Two people who pass each other: the clouds, and a character for each person."""
@@ -131,8 +176,7 @@ class Studio:
 
     def worst(self, path):
         """The frame in which an edge of the mesh is stretched most, and the one in which most of the hands is inside the body."""
-        sys.path.insert(0, self.characters)
-        import check_rig
+        import check_rig  # of --check
         film = study("contacts").Film(check_rig, path)
         edges = np.unique(np.sort(np.concatenate([film.faces[:, [0, 1]], film.faces[:, [1, 2]], film.faces[:, [2, 0]]]), 1), axis=0)
         lengths = lambda world: np.linalg.norm(np.subtract(*film.file.pose(world, film.parts)[edges.T]), axis=1)
@@ -152,9 +196,9 @@ class Studio:
         return Image.open(out).convert("RGB")
 
     def sheet(self):
-        source, rows = self.given("source_dance.glb"), []
+        source, rows = self.performer("dance"), []
         for name in SHEET:
-            out = self.at(name.replace(".", "_") + ".glb")
+            out = self.at("worst_" + name.replace(".", "_") + ".glb")
             self.retarget(source, self.given(name), out, "--clip-name", "film")
             rows.append((name, [p for f in self.worst(out) for p in (self.draw(source, "dance", f), self.draw(out, "film", f))]))
         picture = Image.new("RGB", (8 * 200 + 20, (len(rows) + 1) // 2 * 275), "white")
@@ -164,6 +208,18 @@ class Studio:
             for i, part in enumerate(parts):
                 picture.paste(part, (left + 200 * i, top + 25))
         picture.save(os.path.join(self.out, "characters_worst.jpg"), quality=80)
+
+    def blender(self):
+        """A dance from clouds onto two characters: a line for each."""
+        lines = []
+        for name in ("stout", "lean"):
+            out = self.at("blender_%s.glb" % name)
+            self.retarget(self.performer("dance"), self.given(name), out, "--from-surface", "--clip-name", "film")
+            lines.append([self.draw(out, "film", f, "300x300") for f in (8, 22, 38, 54)])
+        picture = Image.new("RGB", (1200, 600), "white")
+        for k, part in enumerate(lines[0] + lines[1]):
+            picture.paste(part, (k % 4 * 300, k // 4 * 300))
+        picture.save(os.path.join(self.out, "character_blender.jpg"), quality=85)
 
     # ---- a textured scan ----
 
@@ -182,7 +238,7 @@ class Studio:
             f.writelines("v %.5f %.5f %.5f\n" % tuple(v) for v in posed)
             f.writelines("vt %.5f %.5f\n" % tuple(t) for t in places)
             f.writelines("f %s\n" % " ".join("%d/%d" % (v + 1, t + 1) for v, t in zip(*both)) for both in zip(faces, corners))
-        self.retarget(self.given("source_dance.glb"), self.at("scan.obj"), self.at("scan.glb"))
+        self.retarget(self.performer("dance"), self.at("scan.obj"), self.at("scan.glb"))
         pictures = [("the scan: OBJ, PNG", self.at("scan.obj"), "none", 0), ("result at rest: GLB", self.at("scan.glb"), "rest", 0)]
         pictures += [("frame %d" % f, self.at("scan.glb"), "", f) for f in (6, 22, 38)]
         sheet = Image.new("RGB", (300 * len(pictures), 400), "white")
@@ -207,6 +263,13 @@ class Studio:
                     faces.append(both[:, 0])
                     corners.append(both[:, 1])
         return vertices, joints, faces, corners, places
+
+
+def read_points(path):
+    """Places of a binary PLY file of x, y and z alone."""
+    head, body = open(path, "rb").read().split(b"end_header\n", 1)
+    count = next(int(line.split()[2]) for line in head.decode().splitlines() if line.startswith("element vertex"))
+    return np.frombuffer(body, "<f4", count * 3).reshape(-1, 3).astype(float)
 
 
 def colour(point, joints):
@@ -249,22 +312,23 @@ def paint(vertices, joints, faces, corners, places, size=1024):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    for name in ("program", "data", "characters", "rigs", "out"):
+    for name in ("program", "data", "rigs", "out"):
         parser.add_argument(name)
-    parser.add_argument("--only", choices=("sheet", "films", "scan"))
+    parser.add_argument("--only", choices=("readme", "dance", "films", "sheet", "blender", "scan"))
+    parser.add_argument("--check", help="folder of check_rig.py, which the sheet needs")
     parser.add_argument("--people", help="clouds of two people: only their film is made")
+    parser.add_argument("--real", help="a scan: only its picture is made")
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         studio = Studio(options, folder)
         if options.people:
             return studio.people(os.path.abspath(options.people))
-        if options.only in (None, "scan"):
-            studio.scan()
-        if options.only in (None, "films"):
-            for film in FILMS:
-                studio.film(film)
-        if options.only in (None, "sheet"):
-            studio.sheet()
+        if options.real:
+            return studio.real(os.path.abspath(options.real))
+        if options.check:
+            sys.path.insert(0, os.path.abspath(options.check))
+        for part in (options.only,) if options.only else ("readme", "dance", "films", "sheet", "blender", "scan"):
+            getattr(studio, part)()
 
 
 if __name__ == "__main__":

@@ -2,7 +2,8 @@
 """Writes docs/results.md from the committed results under experiments.
 
     python3 docs/make_results.py            writes the page
-    python3 docs/make_results.py --check    1 if the page, or a figure of README.md's table, is not what this writes
+    python3 docs/make_results.py --check    1 if the page, or a figure of README.md's table or of
+                                                `restage weights list`, is not what this writes
     python3 docs/make_results.py --readme   prints a table for README.md
 
 Every figure is computed here; the prose holds none. Files are in metres; the page is in millimetres.
@@ -16,7 +17,7 @@ import sys
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
-PAGE, README = ROOT / "docs/results.md", ROOT / "README.md"
+PAGE, README, LIST = ROOT / "docs/results.md", ROOT / "README.md", ROOT / "experiments/weights/list.json"
 
 # ---- what is committed ---------------------------------------------------------------------------
 
@@ -403,6 +404,19 @@ def check_readme(wanted):
     return out
 
 
+def check_list():
+    """Figures of `restage weights list`."""
+    out = []
+    for row in json.loads(LIST.read_text())["captures"]:
+        if "set" not in row:
+            continue
+        for key, metric in (("joints_mm", "pa_mpjpe"), ("surface_mm", "pa_mpvd")):
+            figure = number(standard.value(row["set"], metric), metric)
+            if f"{row[key]:.1f}" != figure:
+                out.append(f"experiments/weights/list.json: {row[key]} is not what docs/results.md says of '{row['capture']}': {figure}")
+    return out
+
+
 def main(arguments):
     if arguments not in ([], ["--check"], ["--readme"]):
         print(__doc__.strip(), file=sys.stderr)
@@ -414,7 +428,7 @@ def main(arguments):
     if not arguments:
         PAGE.write_text(wanted)
         return 0
-    faults = check_page(wanted) + check_readme(wanted)
+    faults = check_page(wanted) + check_readme(wanted) + check_list()
     print("\n".join(faults) if faults else "docs/results.md: is what docs/make_results.py writes")
     return 1 if faults else 0
 

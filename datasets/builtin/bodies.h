@@ -11,6 +11,10 @@
 
 namespace restage {
 
+/// The licence of built-in bodies and motions, as files say it. The code that makes them is under
+/// Restage's own.
+inline constexpr const char* kBuiltinLicense = "CC0-1.0";
+
 /// Body `index` of a split ("train", "validation", "test"; else InputError). T-pose facing +z, left
 /// = +x, arms along x, lowest vertex at y = 0, 1.45 to 2.0 m high, about 5,000 vertices. The
 /// surface is closed and oriented (counter-clockwise from outside); weights: at most 4 joints per

@@ -1,4 +1,4 @@
-// Two characters or recordings that are shown side by side, in step.
+// Two characters, recordings or scans that are shown side by side, in step.
 #pragma once
 
 #include <array>

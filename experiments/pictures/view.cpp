@@ -191,6 +191,7 @@ Showing view_frames(const ShowRequest& request, std::vector<Joints>& joints) {
   Showing view;
   view.clip = read_clip({.path = request.path,
                          .sequence = request.sequence,
+                         .fps = request.file_fps,
                          .scale = request.scale.value_or(1),
                          .up = request.up.empty() ? "y" : request.up},
                         "", request.max_memory, view.remarks);

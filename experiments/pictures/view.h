@@ -28,6 +28,8 @@ struct ShowRequest {
   std::optional<int64_t> sequence;  ///< of an HDF5 file; nothing: the only one
   std::string up;                   ///< of scans and recordings: the axis that points up; empty: y
   std::optional<double> scale;      ///< of scans and recordings: metres per unit; nothing: 1
+  std::optional<double>
+      file_fps;  ///< of scans: the rate that they were taken at; nothing: the file's
   uint64_t max_memory = 0;
 };
 

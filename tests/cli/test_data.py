@@ -38,7 +38,7 @@ class Data(CliTest):
         self.assertEqual(found["counts"]["bodies"], 2)
         self.assertEqual(found["counts"]["motions"], 2)
         self.assertEqual(found["units"], "metres")
-        self.assertIn("license", found)
+        self.assertEqual(found["license"], "CC0-1.0")
         self.assertEqual(found["splits"]["train"], {"bodies": 1, "motions": 1, "frames": found["splits"]["train"]["frames"]})
         self.assertAlmostEqual(found["seconds"], found["counts"]["frames"] / 30)
         self.assertTrue(1.4 < found["heights"]["least"] <= found["heights"]["most"] < 2.1, found["heights"])

@@ -154,6 +154,21 @@ class RenderSource(CliTest):
         found = self.json("view", "results/r.h5", "--compare", "m.h5", "--out", "sheet.png")
         self.assertEqual((found["source"], found["frames"]), ("m.h5", FRAMES // 2))
 
+    def test_scans_beside_what_was_made_of_them_as_an_animation(self):
+        """Both at one rate: --source-fps says how fast the scans were taken."""
+        self.done(*self.retarget("moving.glb", "--source", "plain"))
+        found = {}
+        for fps in (30, 15):
+            found[fps] = self.json("view", "moving.glb", "--compare", "plain", "--source-fps", fps, "--size", "160x80", "--out", "%d.webp" % fps)
+            self.assertEqual((found[fps]["source"], found[fps]["width"], found[fps]["fps"]), ("plain", 160, 30))
+        self.assertEqual(found[30]["frames"], FRAMES // 2)
+        self.assertEqual(found[15]["frames"], 2 * (FRAMES // 2) - 1, "slower scans last longer; the character holds its last frame")
+        self.assertNotEqual(self.bytes("30.webp"), self.bytes("15.webp"))
+        # Read as is said: the same person in other units and axes is the same picture.
+        self.json("view", "moving.glb", "--compare", "odd", *self.compared(), "--size", "160x80", "--out", "odd.webp")
+        self.done("view", "moving.glb", "--compare", "odd", "--source-fps", 60, "--size", "160x80", "--out", "lying.webp")
+        self.assertNotEqual(self.bytes("odd.webp"), self.bytes("lying.webp"))
+
     def test_the_older_name_of_the_command(self):
         """render goes on working, with the names that its options had; a remark says the new ones."""
         wanted, _ = self.sheet("results/r.h5")

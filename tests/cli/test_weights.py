@@ -53,6 +53,20 @@ class Weights(CliTest):
             found = self.json("skeleton", "--weights", shipped, "--source", "a.ply")["frames"]
             self.assertEqual(len(found[0]["joints"]), 22, name)
 
+    def test_list_names_all_shipped_weights(self):
+        folder = os.path.join(ROOT, "experiments", "weights")
+        listed = self.json("weights", "list")
+        names = {row["name"] for row in listed["weights"]}
+        self.assertEqual(names, {f[:-len(".safetensors")] for f in os.listdir(folder) if f.endswith(".safetensors")})
+        for row in listed["weights"]:
+            self.assertEqual(row["bytes"], os.path.getsize(row["file"]))
+            self.assertEqual(row["joints"], "makehuman")
+        for row in listed["captures"]:
+            self.assertIn(row["weights"].split(",")[0].split()[0], names | {"none"})
+        text = self.done("weights", "list")
+        for word in ("one depth camera", "43.5", "standard", "makehuman", "8.4"):
+            self.assertIn(word, text)
+
     def test_show_takes_names_and_says_which_file(self):
         for name in ("lite", "standard"):
             shown = self.json("weights", "show", name)

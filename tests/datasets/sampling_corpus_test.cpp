@@ -10,6 +10,7 @@
 #include <memory>
 #include <set>
 
+#include "datasets/builtin/bodies.h"
 #include "datasets/sampling/clouds.h"
 #include "datasets/sampling/evaluation.h"
 #include "datasets/sampling/pairs.h"
@@ -79,6 +80,7 @@ TEST_F(SamplingCorpus, BuiltinIsTheSameForEverySplitAloneAndTogether) {
   source.bodies = {1, 1, 0};
   source.motions = {2, 1, 0};
   const Corpus all = load_corpus(source);
+  EXPECT_EQ(all.license, kBuiltinLicense);
   EXPECT_EQ(all.bodies.size(), 2u);
   EXPECT_EQ(all.motions.size(), 3u);
   EXPECT_FALSE(all.license.empty());

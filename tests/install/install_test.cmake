@@ -21,6 +21,12 @@ if(NOT output MATCHES "d/dx sum\\(x\\^2\\) = 2 4 6")
 endif()
 run(${work}/prefix/bin/restage --version)
 
+foreach(part hero.glb scans/09.ply README.md)
+  if(NOT EXISTS ${work}/prefix/share/restage/docs/sample/${part})
+    message(FATAL_ERROR "docs/sample/${part} is not installed")
+  endif()
+endforeach()
+
 # Nothing is installed that no command reads, and every link of a page leads to a file.
 file(GLOB_RECURSE unread ${work}/prefix/*/trials/*)
 if(unread)

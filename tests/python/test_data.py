@@ -130,7 +130,7 @@ def test_order_and_number(corpus):
     assert list(some(steps=0)) == [] and differ(plain[0], plain[1])
     batches.close()
     assert list(batches) == []
-    again = list(data.clouds(restage.Config("demo", {"data.source": corpus, "skeleton.optimiser.batch": 2, "loop.overfit_batches": 2}), steps=4,
+    again = list(data.clouds(restage.Config("lite/all", {"data.source": corpus, "skeleton.optimiser.batch": 2, "loop.overfit_batches": 2}), steps=4,
                              points=64))
     equal(again[0], again[2])
     equal(again[1], again[3])

@@ -20,3 +20,13 @@ def test_examples(walk, tmp_path, monkeypatch):
     own = next(example for example in examples if "role=\"motion\"" in example)
     assert own.count("\n") < 60
     assert names["distance"].item() < 0.4  # metres, of the network on the data of the program
+
+
+def test_readmes_sample(tmp_path, monkeypatch):
+    """The lines of README.md on docs/sample, as they stand there."""
+    (tmp_path / "docs").symlink_to(ROOT / "docs")
+    monkeypatch.chdir(tmp_path)
+    lines, = re.findall(r"^```python\n(.*?)^```$", (ROOT / "README.md").read_text(), re.M | re.S)
+    exec(compile(lines, "README.md", "exec"), {})
+    assert (tmp_path / "hero_moving.glb").stat().st_size > (ROOT / "docs/sample/hero.glb").stat().st_size
+    assert b"<html" in (tmp_path / "moving.html").read_bytes()

@@ -139,7 +139,7 @@ def test_a_worker_that_is_a_fork(torch, corpus):
 
 
 def test_examples_of_a_stage(torch, corpus):
-    config = restage.Config("demo", {"data.source": corpus, "skeleton.optimiser.batch": 2})
+    config = restage.Config("lite/all", {"data.source": corpus, "skeleton.optimiser.batch": 2})
     assert same(next(iter(restage.torch.examples(config, "skeleton", steps=1))), next(data.examples(config, "skeleton", steps=1)))
 
 

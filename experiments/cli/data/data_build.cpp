@@ -44,7 +44,7 @@ int build_builtin(const BuildOptions& options, const Common& common) {
   if (total(b) + total(m) == 0)
     throw InputError("", "no bodies and no motions were asked for", "give --bodies or --motions");
   DatasetWriter writer(options.out,
-                       {"CC0-1.0", "built-in source, seed " + std::to_string(common.seed)});
+                       {kBuiltinLicense, "built-in source, seed " + std::to_string(common.seed)});
   log_info("building " + std::to_string(total(b)) + " bodies and " + std::to_string(total(m)) +
            " motions with seed " + std::to_string(common.seed));
   for (const Body& body : builtin_bodies(common.seed, b[0], b[1], b[2])) writer.add(body);

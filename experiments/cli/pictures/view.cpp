@@ -10,6 +10,7 @@
 #include "autograd/base/format.h"
 #include "autograd/base/log.h"
 #include "autograd/base/output_check.h"
+#include "datasets/readers/frames/hdf5_frames.h"
 #include "experiments/cli/commands.h"
 #include "experiments/cli/output.h"
 #include "experiments/cli/perform/source_options.h"
@@ -151,7 +152,7 @@ Rows read_beside(const ViewOptions& o, uint64_t max_memory) {
   return read_rows(file, how, r.look, max_memory);
 }
 
-/// Two characters or recordings: --compare's, then the file's.
+/// Two characters or recordings, or any two files in an animation: --compare's, then the file's.
 Rows write_two_takes(const ViewOptions& o, ViewKind kind, const std::string& out,
                      uint64_t max_memory, Json& document) {
   ShowRequest second = request_of(o, kind, max_memory), first = second;
@@ -159,6 +160,8 @@ Rows write_two_takes(const ViewOptions& o, ViewKind kind, const std::string& out
   first.clip = o.beside.clip.value_or("");
   first.up = o.beside.up.value_or("");
   first.scale = o.beside.scale;
+  first.file_fps = o.beside.fps;
+  if (o.beside.sequence || !is_hdf5(o.compare)) first.sequence = o.beside.sequence;
   TwoTakes takes = read_two_takes(first, second);
   Rows rows;
   for (Showing& shown : takes.shown) rows.clips.push_back(std::move(shown.clip));
@@ -327,6 +330,7 @@ void add_view(Program& program) {
       "restage view scans/ --up z --scale mm --out scans.webp\n"
       "restage view motions.h5 --sequence 3 --out motion.gif\n"
       "restage view --compare before.glb after.glb --out both.webp\n"
+      "restage view hero_moving.glb --compare scans/ --source-fps 60 --out both.webp\n"
       "restage view result.h5 --compare source --out sheet.png\n"
       "restage view result.h5 --compare mm/ --source-fps 60 --source-up z --source-scale mm --out "
       "page.html\n"
@@ -346,8 +350,8 @@ void add_view(Program& program) {
   app.add_option(
       "--compare", options.compare,
       "another character or recording, shown in step on the left: same clock, scale and "
-      "camera; of a result or scans what the motion was taken from, on a sheet (.png) or "
-      "a page (.html): a file, or the word source for what a result remembers");
+      "camera; of a result what the motion was taken from, such as scans: a file, or, on a sheet "
+      "(.png) or a page (.html), the word source for what the result remembers");
   add_comparison(app, options, false);
   add_camera(app, options);
   app.add_option("--clip", r.clip,

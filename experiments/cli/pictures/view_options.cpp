@@ -14,6 +14,10 @@ namespace {
 
 constexpr int kLeastSide = 16, kMostSide = 4096;
 
+bool is_take(const std::string& path) {
+  return is_gltf_name(path) || text::ends_in(path, {".bvh", ".amc"});
+}
+
 using Given = std::initializer_list<std::pair<bool, const char*>>;
 
 /// The options of `list` that are given, and why they are refused.
@@ -46,7 +50,7 @@ void check_kind(const ViewOptions& o, ViewKind kind) {
     refuse({{o.every.has_value(), "--every"}, {!o.title.empty(), "--title"}},
            "is not for a picture of one moment");
   if (is_animation(kind))
-    refuse({{!o.compare.empty() && !o.two_takes(), "--compare"},
+    refuse({{o.compare == kRemembered, "--compare source"},
             {!o.beside.truth.empty(), "--truth"},
             {o.columns.has_value(), "--columns"},
             {!o.title.empty(), "--title"}},
@@ -60,9 +64,11 @@ void check_together(const ViewOptions& o) {
   refuse({{r.frame && r.seconds, "--frame"}}, "contradicts --time");
   refuse({{!o.side.empty() && o.azimuth, "--side"}}, "contradicts --azimuth");
   refuse({{r.look.within && r.look.part.empty(), "--within"}}, "belongs to --look");
-  if (o.two_takes())
+  if (o.two_takes() && is_take(o.compare))
     refuse({{c.fps.has_value(), "--source-fps"}, {c.sequence.has_value(), "--source-sequence"}},
            "does not go with two characters or recordings");
+  else if (o.two_takes())
+    return;
   else if (o.compares())
     refuse({{o.fps.has_value(), "--fps"},
             {o.every.has_value(), "--every"},
@@ -106,10 +112,9 @@ void check_ranges(const ViewOptions& o, ViewKind kind) {
 }  // namespace
 
 bool ViewOptions::two_takes() const {
-  const auto is_take = [](const std::string& path) {
-    return is_gltf_name(path) || text::ends_in(path, {".bvh", ".amc"});
-  };
-  return !rows && beside.truth.empty() && is_take(compare) && is_take(request.path);
+  if (rows || !beside.truth.empty() || compare.empty() || compare == kRemembered) return false;
+  const bool animation = text::ends_in(out, {".webp", ".gif"});
+  return animation || (is_take(compare) && is_take(request.path));
 }
 
 ViewKind kind_of(const ViewOptions& o) {

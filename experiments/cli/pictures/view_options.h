@@ -23,7 +23,7 @@ struct ViewOptions {
 
   bool rows = false;  ///< also where nothing is beside the file (render)
 
-  /// Two characters or recordings, which are shown alike.
+  /// What is shown alike: two characters or recordings, and in an animation any two files.
   bool two_takes() const;
   bool compares() const { return rows || !compare.empty() || !beside.truth.empty(); }
 };

@@ -7,6 +7,7 @@
 #include "autograd/base/words.h"
 #include "experiments/cli/commands.h"
 #include "experiments/cli/output.h"
+#include "experiments/cli/training/weights_list.h"
 #include "nn/models/motion.h"
 #include "nn/weights/bundle.h"
 #include "nn/weights/state.h"
@@ -252,6 +253,7 @@ void add_export(Program& program, CommandOptions group) {
 
 void add_weights(Program& program) {
   CommandOptions group = program.add_group("weights", "look into weights files, import and export");
+  add_weights_list(program, group);
   auto [show, file] =
       program.add(group, "show", "list what a safetensors file holds",
                   "restage weights show w.safetensors\nrestage weights show w.safetensors --json\n"
