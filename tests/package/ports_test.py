@@ -1,0 +1,78 @@
+"""The files for other package managers (cmake/ports): each can be read, and names this version and every library of CMakeLists.txt.
+
+None of them is run. A reader that is missing here (ruby, PyYAML) leaves out that check.
+"""
+import ast
+import importlib.util
+import json
+import pathlib
+import re
+import shutil
+import subprocess
+import unittest
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+PORTS = ROOT / "cmake/ports"
+CMAKE = (ROOT / "CMakeLists.txt").read_text()
+VERSION = re.search(r"project\(restage VERSION ([\d.]+)", CMAKE)[1]
+FILES = {"vcpkg": "vcpkg/restage/vcpkg.json", "spack": "spack/restage/package.py", "conda": "conda/recipe.yaml",
+         "homebrew": "homebrew/restage.rb"}
+# A library as CMake finds it, and its name in each package manager, in the order of FILES.
+NAMES = {
+    "Eigen3": ("eigen3", "eigen", "eigen", "eigen"), "TBB": ("tbb", "intel-oneapi-tbb", "tbb-devel", "tbb"),
+    "HDF5": ("hdf5",) * 4, "yaml-cpp": ("yaml-cpp",) * 4, "spdlog": ("spdlog",) * 4,
+    "nlohmann_json": ("nlohmann-json", "nlohmann-json", "nlohmann_json", "nlohmann-json"), "CLI11": ("cli11",) * 4,
+    "LibLZMA": ("liblzma", "xz", "liblzma-devel", "xz"), "ZLIB": ("zlib", "zlib-api", "zlib", "zlib"), "libzip": ("libzip",) * 4,
+    "liblo": ("liblo",) * 4, "libwebsockets": ("libwebsockets",) * 4, "libwebpmux": ("libwebp", "libwebp", "libwebp", "webp"),
+    "libwebp": ("libwebp", "libwebp", "libwebp", "webp"), "GIF": ("giflib",) * 4, "TinyGLTF": ("tinygltf",) * 4,
+    "OpenSSL": ("openssl", "openssl", "openssl", "openssl@3"), "CURL": ("curl", "curl", "libcurl", "curl"),
+    "hwy": ("highway", "highway", "libhwy", "highway"), "assimp": ("assimp",) * 4,
+}
+NOT_LIBRARIES = {"PkgConfig", "Git"}
+OPTIONAL = {"MPI", "CUDAToolkit", "GTest"}  # off, or for tests
+
+
+def wanted():
+    """The libraries of CMakeLists.txt, as CMake finds them."""
+    found = set(re.findall(r"find_package\((\S+)", CMAKE))
+    for words in re.findall(r"pkg_check_modules\(\S+ (?:REQUIRED|QUIET) IMPORTED_TARGET ([^)]*)\)", CMAKE):
+        found |= {word.split(">=")[0] for word in words.split()}
+    return found - NOT_LIBRARIES - OPTIONAL
+
+
+class PortsTest(unittest.TestCase):
+    def test_libraries(self):
+        self.assertEqual(wanted(), set(NAMES), "CMakeLists.txt and NAMES here differ")
+        for place, (manager, file) in enumerate(FILES.items()):
+            text = (PORTS / file).read_text()
+            for library, names in NAMES.items():
+                self.assertRegex(text, rf"[\" ]{re.escape(names[place])}[\"@ ,~\n]", f"{manager} lacks {library}")
+
+    def test_version(self):
+        for manager, file in FILES.items():
+            self.assertIn(VERSION, (PORTS / file).read_text(), manager)
+
+    def test_json_and_python(self):
+        self.assertEqual(json.loads((PORTS / FILES["vcpkg"]).read_text())["version"], VERSION)
+        ast.parse((PORTS / FILES["spack"]).read_text())
+
+    @unittest.skipUnless(importlib.util.find_spec("yaml"), "PyYAML is missing")
+    def test_yaml(self):
+        import yaml
+        self.assertEqual(yaml.safe_load((PORTS / FILES["conda"]).read_text())["package"]["version"], VERSION)
+
+    @unittest.skipUnless(shutil.which("ruby"), "ruby is missing")
+    def test_ruby(self):
+        done = subprocess.run(["ruby", "-c", PORTS / FILES["homebrew"]], capture_output=True, text=True)
+        self.assertEqual(done.returncode, 0, done.stderr)
+
+    def test_options(self):
+        """Options that the files give exist."""
+        known = set(re.findall(r"(?:option|set)\((RESTAGE_\w+)", CMAKE)) | {"RESTAGE_PYTHON_DIR"}
+        for path in PORTS.rglob("*"):
+            if path.is_file() and path.suffix != ".md":
+                self.assertLessEqual(set(re.findall(r"RESTAGE_[A-Z_]+", path.read_text())), known, path.name)
+
+
+if __name__ == "__main__":
+    unittest.main()
