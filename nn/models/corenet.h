@@ -69,8 +69,9 @@ struct Normalised : WithMean {
   Var unit;  ///< (x - mean) / s, with the unbiased deviation s
 };
 
-/// Elastic instance normalisation and a leaky ReLU: unit (1 + G) + B before it, with scale and shift between what the
-/// identity's features ask for, gamma and beta, and x's own deviation s and mean m:
+/// Elastic instance normalisation and a leaky ReLU: unit (1 + G) + B before it, with scale and
+/// shift between what the identity's features ask for, gamma and beta, and x's own deviation s and
+/// mean m:
 ///   G = share gamma + (1 - share) s,   B = share beta + (1 - share) m,   share = mix(same f, m).
 /// Since s unit + m is x itself, that is share (unit gamma + beta) + unit + (1 - share) x. gamma
 /// and beta are linear in the features f [n, v, i], so one product each makes them of f.
