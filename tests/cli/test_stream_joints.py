@@ -196,7 +196,9 @@ class Lines(StreamTest):
         self.perform(self.writer(process), [line(f) for f in range(34)])
         data = b""
         while b"\r\n\r\n" not in data or len(data) < 20000:
-            data += web.recv(1 << 16)
+            more = web.recv(1 << 16)
+            self.assertTrue(more, "the page was closed after %d bytes" % len(data))
+            data += more
         message = data.partition(b"\r\n\r\n")[2]
         count = struct.unpack_from("<I", message, (4 if message[1] == 126 else 10) + 12)[0]
         with open(self.target, "rb") as f:
