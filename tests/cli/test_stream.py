@@ -696,7 +696,7 @@ class Streams(StreamTest):
         rows = pixels(self.bytes("seen.png"))
         flat = [p for row in rows for p in row]
         for colour in (0, 1):
-            self.assertGreater(sum(p[colour] > 200 and max(p[j] for j in range(3) if j != colour) < 60 for p in flat), 300, "red, green")
+            self.assertGreater(sum(p[colour] > 200 and max(p[j] for j in range(3) if j != colour) < 60 for p in flat), 100, "red, green")  # by the frame
         self.interrupted(process)
 
     def test_ends_after_so_many_seconds(self):
