@@ -15,37 +15,7 @@ HWY_BEFORE_NAMESPACE();
 namespace restage::cpu::HWY_NAMESPACE {
 namespace {
 
-constexpr int64_t kPart = 512;    // rows per partial sum
-constexpr int64_t kTogether = 8;  // rows that are added before a sum is written again
-
-template <class D>
-HWY_INLINE hn::Vec<D> wide(D d, const float* from) {
-  return hn::PromoteTo(d, hn::LoadU(hn::Rebind<float, D>(), from));
-}
-template <class D>
-HWY_INLINE hn::Vec<D> wide(D d, const double* from) {
-  return hn::LoadU(d, from);
-}
-template <class D>
-HWY_INLINE void narrow(D, hn::Vec<D> x, float* to) {
-  const hn::Rebind<float, D> f;
-  hn::StoreU(hn::DemoteTo(f, x), f, to);
-}
-template <class D>
-HWY_INLINE void narrow(D d, hn::Vec<D> x, double* to) {
-  hn::StoreU(x, d, to);
-}
-
-/// f(tag of doubles, column) for vectors of columns, and one by one for what is left.
-template <class F>
-HWY_INLINE void for_vectors(int64_t columns, const F& f) {
-  const hn::ScalableTag<double> many;
-  const hn::CappedTag<double, 1> one;
-  const auto lanes = static_cast<int64_t>(hn::Lanes(many));
-  int64_t i = 0;
-  for (; i + lanes <= columns; i += lanes) f(many, i);
-  for (; i < columns; ++i) f(one, i);
-}
+constexpr int64_t kPart = 512;  // rows per partial sum
 
 /// x [outer, n, inner], whose columns are normalised over n. Work is cut into blocks and, within
 /// these, into parts of rows, so any number of threads has some.
@@ -53,31 +23,28 @@ struct Columns {
   int64_t outer, n, inner;
   int64_t parts = std::max<int64_t>(1, (n + kPart - 1) / kPart);
 
-  /// f(row, rows, block, part) for all rows of x, `rows` of them at once; parts are numbered
-  /// through.
+  /// f(row, block, part) for all rows of x; parts are numbered through.
   template <class F>
-  void each_rows(const F& f) const {
+  void each_row(const F& f) const {
     const int64_t grain = row_grain(std::min(n, kPart) * inner);
     parallel_for(outer * parts, grain, [&](int64_t from, int64_t to) HWY_ATTR {
       for (int64_t part = from; part < to; ++part) {
         const int64_t block = part / parts, first = part % parts * kPart;
-        const int64_t last = std::min(n, first + kPart);
-        for (int64_t r = first; r < last; r += kTogether)
-          f(block * n + r, std::min(kTogether, last - r), block, part);
+        for (int64_t r = first; r < std::min(n, first + kPart); ++r) f(block * n + r, block, part);
       }
     });
   }
 
   /// [outer, Count, inner]: sums over the rows of each block, in an order that sizes decide.
-  /// add(row, rows, block, sums) adds rows, one after the other.
+  /// add(row, block, sums) adds one row.
   template <int64_t Count, class F>
   Scratch<double> sums(const F& add) const {
     const int64_t width = Count * inner;
     Scratch<double> of_parts(static_cast<size_t>(outer * parts * width), 0.0),
         of_blocks(static_cast<size_t>(outer * width), 0.0);
     double *partial = of_parts.data(), *total = of_blocks.data();
-    each_rows([&](int64_t row, int64_t rows, int64_t block, int64_t part)
-                  HWY_ATTR { add(row, rows, block, partial + part * width); });
+    each_row([&](int64_t row, int64_t block, int64_t part)
+                 HWY_ATTR { add(row, block, partial + part * width); });
     parallel_for(outer, row_grain(parts * width), [&](int64_t from, int64_t to) HWY_ATTR {
       for (int64_t part = from * parts; part < to * parts; ++part)
         for (int64_t i = 0; i < width; ++i)
@@ -96,58 +63,35 @@ Scratch<double> along_inner(const Tensor* t, Affine affine, int64_t inner, doubl
   return out;
 }
 
-/// The mean of each column, and one over its deviation.
-template <class T>
-void column_statistics(const NormArgs& args, const Columns& c) {
-  const int64_t inner = c.inner;
-  const T* x = args.x.data<T>();
-  double *mean = args.mean.data<double>(), *rstd = args.rstd.data<double>();
-  const auto count = static_cast<double>(c.n);
-  const auto add = [&](int64_t row, int64_t rows, int64_t, double* a) HWY_ATTR {
-    for_vectors(inner, [&](auto d, int64_t i) HWY_ATTR {
-      auto sum = hn::LoadU(d, a + i);
-      for (int64_t k = 0; k < rows; ++k) sum = hn::Add(sum, wide(d, x + (row + k) * inner + i));
-      hn::StoreU(sum, d, a + i);
-    });
-  };
-  const Scratch<double> sums = c.sums<1>(add);
-  for (int64_t k = 0; k < c.outer * inner; ++k) mean[k] = sums[k] / count;
-  const auto add_square = [&](int64_t row, int64_t rows, int64_t block, double* a) HWY_ATTR {
-    for_vectors(inner, [&](auto d, int64_t i) HWY_ATTR {
-      const auto m = hn::LoadU(d, mean + block * inner + i);
-      auto sum = hn::LoadU(d, a + i);
-      for (int64_t k = 0; k < rows; ++k) {
-        const auto from_mean = hn::Sub(wide(d, x + (row + k) * inner + i), m);
-        sum = hn::MulAdd(from_mean, from_mean, sum);
-      }
-      hn::StoreU(sum, d, a + i);
-    });
-  };
-  const Scratch<double> squares = c.sums<1>(add_square);
-  for (int64_t k = 0; k < c.outer * inner; ++k)
-    rstd[k] = 1.0 / std::sqrt(squares[k] / count + args.eps);
-}
-
 template <class T>
 void norm_columns(const NormArgs& args) {
   const Columns c{args.outer, args.n, args.inner};
   const int64_t inner = c.inner;
   const Scratch<double> scale = along_inner<T>(args.scale, args.affine, inner, 1);
   const Scratch<double> shift = along_inner<T>(args.shift, args.affine, inner, 0);
-  column_statistics<T>(args, c);
   const T* x = args.x.data<T>();
   T* out = args.out.data<T>();
-  const double *mean = args.mean.data<double>(), *rstd = args.rstd.data<double>();
-  c.each_rows([&](int64_t row, int64_t rows, int64_t block, int64_t) HWY_ATTR {
-    for_vectors(inner, [&](auto d, int64_t i) HWY_ATTR {
-      const auto m = hn::LoadU(d, mean + block * inner + i);
-      const auto r = hn::LoadU(d, rstd + block * inner + i);
-      const auto sc = hn::LoadU(d, scale.data() + i), sh = hn::LoadU(d, shift.data() + i);
-      for (int64_t k = 0; k < rows; ++k) {
-        const int64_t at = (row + k) * inner + i;
-        narrow(d, hn::MulAdd(hn::Mul(hn::Sub(wide(d, x + at), m), r), sc, sh), out + at);
-      }
-    });
+  double *mean = args.mean.data<double>(), *rstd = args.rstd.data<double>();
+  const Scratch<double> sums = c.sums<1>([&](int64_t row, int64_t, double* a) HWY_ATTR {
+    for (int64_t i = 0; i < inner; ++i) a[i] += static_cast<double>(x[row * inner + i]);
+  });
+  const auto count = static_cast<double>(c.n);
+  for (int64_t k = 0; k < c.outer * inner; ++k) mean[k] = sums[k] / count;
+  const Scratch<double> squares = c.sums<1>([&](int64_t row, int64_t block, double* a) HWY_ATTR {
+    const double* m = mean + block * inner;
+    for (int64_t i = 0; i < inner; ++i) {
+      const double d = static_cast<double>(x[row * inner + i]) - m[i];
+      a[i] += d * d;
+    }
+  });
+  for (int64_t k = 0; k < c.outer * inner; ++k)
+    rstd[k] = 1.0 / std::sqrt(squares[k] / count + args.eps);
+  const double *sc = scale.data(), *sh = shift.data();
+  c.each_row([&](int64_t row, int64_t block, int64_t) HWY_ATTR {
+    const double *m = mean + block * inner, *r = rstd + block * inner;
+    for (int64_t i = 0; i < inner; ++i)
+      out[row * inner + i] =
+          static_cast<T>((static_cast<double>(x[row * inner + i]) - m[i]) * r[i] * sc[i] + sh[i]);
   });
 }
 
@@ -156,41 +100,29 @@ void norm_columns_grad(const NormGradArgs& args) {
   const Columns c{args.outer, args.n, args.inner};
   const int64_t inner = c.inner;
   const Scratch<double> scale = along_inner<T>(args.scale, args.affine, inner, 1);
+  const double* sc = scale.data();
   const T *x = args.x.data<T>(), *gy = args.gy.data<T>();
   T* out = args.out.data<T>();
   const double *mean = args.mean.data<double>(), *rstd = args.rstd.data<double>();
   // Per column the sum of the output's gradient, then of it times the normalised input.
-  const auto add = [&](int64_t row, int64_t rows, int64_t block, double* a) HWY_ATTR {
-    for_vectors(inner, [&](auto d, int64_t i) HWY_ATTR {
-      const auto m = hn::LoadU(d, mean + block * inner + i);
-      const auto s = hn::LoadU(d, rstd + block * inner + i);
-      auto sum = hn::LoadU(d, a + i), times_x = hn::LoadU(d, a + inner + i);
-      for (int64_t k = 0; k < rows; ++k) {
-        const int64_t at = (row + k) * inner + i;
-        const auto g = wide(d, gy + at);
-        sum = hn::Add(sum, g);
-        times_x = hn::MulAdd(hn::Mul(g, hn::Sub(wide(d, x + at), m)), s, times_x);
-      }
-      hn::StoreU(sum, d, a + i);
-      hn::StoreU(times_x, d, a + inner + i);
-    });
-  };
-  const Scratch<double> sums = c.sums<2>(add);
+  const Scratch<double> sums = c.sums<2>([&](int64_t row, int64_t block, double* a) HWY_ATTR {
+    const double *m = mean + block * inner, *s = rstd + block * inner;
+    double* b = a + inner;
+    for (int64_t i = 0; i < inner; ++i) {
+      const double g = static_cast<double>(gy[row * inner + i]);
+      a[i] += g;
+      b[i] += g * (static_cast<double>(x[row * inner + i]) - m[i]) * s[i];
+    }
+  });
   const double inv = 1.0 / static_cast<double>(c.n);
-  c.each_rows([&](int64_t row, int64_t rows, int64_t block, int64_t) HWY_ATTR {
-    for_vectors(inner, [&](auto d, int64_t i) HWY_ATTR {
-      const auto m = hn::LoadU(d, mean + block * inner + i);
-      const auto s = hn::LoadU(d, rstd + block * inner + i);
-      const auto sg = hn::LoadU(d, sums.data() + block * 2 * inner + i);
-      const auto sgx = hn::LoadU(d, sums.data() + (block * 2 + 1) * inner + i);
-      const auto factor = hn::Mul(hn::LoadU(d, scale.data() + i), s), share = hn::Set(d, inv);
-      for (int64_t k = 0; k < rows; ++k) {
-        const int64_t at = (row + k) * inner + i;
-        const auto h = hn::Mul(hn::Sub(wide(d, x + at), m), s);
-        const auto part = hn::NegMulAdd(share, hn::MulAdd(h, sgx, sg), wide(d, gy + at));
-        narrow(d, hn::Mul(factor, part), out + at);
-      }
-    });
+  c.each_row([&](int64_t row, int64_t block, int64_t) HWY_ATTR {
+    const double *m = mean + block * inner, *s = rstd + block * inner;
+    const double *sg = sums.data() + block * 2 * inner, *sgx = sg + inner;
+    for (int64_t i = 0; i < inner; ++i) {
+      const double h = (static_cast<double>(x[row * inner + i]) - m[i]) * s[i];
+      const double g = static_cast<double>(gy[row * inner + i]);
+      out[row * inner + i] = static_cast<T>(sc[i] * s[i] * (g - inv * (sg[i] + h * sgx[i])));
+    }
   });
   if (args.g_scale == nullptr) return;  // only ever with one block: batch norm
   for (int64_t i = 0; i < inner; ++i) {
