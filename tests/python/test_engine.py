@@ -616,3 +616,14 @@ def test_train(tmp_path):
             restage.train(config, on_step=stop)
     with pytest.raises(restage.InputError):
         restage.train(tmp_path / "no.yaml")
+
+
+@pytest.mark.parametrize("transposed", [False, True])
+def test_a_product_with_one_column_has_the_bits_of_a_wider_one(transposed):
+    random = np.random.default_rng(5)
+    for rows, depth, batch in ((1, 7, ()), (70, 300, ()), (33, 520, (3,))):
+        shape = (depth, rows) if transposed else (rows, depth)
+        a, b = (random.standard_normal((*batch, *s)).astype(np.float32) for s in (shape, (depth, 9)))
+        wide = restage.ops.matmul(a, b, transposed).numpy()
+        for k in (0, 8):
+            assert np.array_equal(restage.ops.matmul(a, np.ascontiguousarray(b[..., k:k + 1]), transposed).numpy(), wide[..., k:k + 1])
