@@ -32,7 +32,9 @@ struct ChildResult {
 /// dies with its parent. Signals that ask to stop (Ctrl-C) are the parent's business: the child
 /// does not hear them, and if the wish comes while the child works (stop_requested()), the child is
 /// ended and Interrupted is thrown. How the host of this process treats SIGCHLD makes no
-/// difference. WorkError naming `where`: no child could be started, or somebody killed it.
+/// difference. Where this process has other threads, a child that finds no end is replaced once: it
+/// may wait for a lock of a thread that the copy does not have. WorkError naming `where`: no child
+/// could be started, or somebody killed it.
 ChildResult in_a_child(const ChildLimits& limits, const std::string& where,
                        const std::function<std::string()>& work);
 

@@ -8,8 +8,10 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <atomic>
 #include <cerrno>
 #include <chrono>
+#include <mutex>
 #include <thread>
 #include <vector>
 
@@ -87,6 +89,21 @@ TEST(ChildProcess, ACrashIsTheChildsAlone) {
 TEST(ChildProcess, TimeOfTheProcessorAndOfTheClockAreLimited) {
   EXPECT_EQ(run(spin, {kLimits.memory, 1, 30}).end, no_end);
   EXPECT_EQ(run(sleep_long, {kLimits.memory, 20, 1}).end, no_end);
+}
+
+/// The copy of a process has one thread. A lock that another thread held is never opened in it.
+TEST(ChildProcess, AChildThatWaitsForALockOfAnotherThreadIsReplaced) {
+  std::mutex lock;
+  std::atomic<bool> held = false;
+  std::thread other([&] {
+    const std::lock_guard<std::mutex> guard(lock);
+    held = true;
+    std::this_thread::sleep_for(std::chrono::seconds(2));
+  });
+  while (!held) std::this_thread::yield();
+  const auto ask = [&] { return std::lock_guard<std::mutex>(lock), std::string("good"); };
+  EXPECT_EQ(run(ask).answer, "good");
+  other.join();
 }
 
 TEST(ChildProcess, TimeIsLimitedWhereTheThreadBlocksSignals) {
