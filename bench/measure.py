@@ -248,11 +248,13 @@ def measure_item(programs, item, quiet, seconds, quick):
 
 def ratios(result):
     """By variant: {"installed": ..., "tuned": ..., "best": ...}, medians over the rounds of LibTorch's time
-    divided by ours in the same round, the least of them over the settings."""
+    divided by ours in the same round, the least of them over the settings that were in all rounds."""
     out = {}
     for variant, ours in result["ours"].items():
         by_kind = {}
         for setting, theirs in result["libtorch"].items():
+            if len(theirs["all"]) < len(ours["all"]):
+                continue
             pairs = [b / a for a, b in zip(ours["all"], theirs["all"])]
             kind = setting.split(",")[0]
             by_kind[kind] = min(by_kind.get(kind, math.inf), statistics.median(pairs))
