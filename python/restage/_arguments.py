@@ -5,8 +5,6 @@ is at fault.
 """
 import difflib
 import functools
-import inspect
-import numbers
 import re
 
 from . import _core
@@ -19,13 +17,23 @@ class _Argument(_core.InputError, TypeError):
 _Argument.__name__ = _Argument.__qualname__ = "InputError"
 _Argument.__module__ = "restage"
 
+def _is_number(value):
+    try:
+        return not isinstance(value, (str, bytes)) and float(value) is not None
+    except (TypeError, ValueError):
+        return False
+
+
 _KINDS = {
-    "float": (lambda v: isinstance(v, numbers.Real) or hasattr(v, "__float__"), "a number"),
+    "float": (_is_number, "a number"),
     "int": (lambda v: hasattr(v, "__index__"), "a whole number"),
     "bool": (lambda v: isinstance(v, bool) or type(v).__name__ == "bool_", "True or False"),
     "str": (lambda v: isinstance(v, (str, bytes)), "text"),
     "dict": (lambda v: isinstance(v, dict), "a dict"),
 }
+# Arguments of any type: what to give.
+_OBJECTS = {"parameters": "a Model, a dict or a list of Parameters", "array": "numbers, such as an array of NumPy", "forward": "a function",
+            "backward": "a function", "x": "a Var or an array", "value": "a Parameter or an array"}
 
 
 def _split(text):
@@ -97,7 +105,7 @@ def _fault(name, line, given, named):
     for key, kind, needed in known:
         wanted = _wanted(kind)
         if needed and key not in values:
-            return f"restage: {name}(): {key} is missing; give " + (wanted[1] if wanted else f"it (help(restage.{name}) says what it is)")
+            return f"restage: {name}(): {key} is missing; give {wanted[1] if wanted else _OBJECTS.get(key, 'it')}"
         if key in values and wanted and not wanted[0](values[key]):
             return f"restage: {name}(): {key} is {_shown(values[key])}; give {wanted[1]}"
     return generic
@@ -116,21 +124,23 @@ def plain(function, name, bound=False):
                 raise
             fault = _fault(name, line, args[1:] if bound else args, kwargs)
         raise _Argument(fault)
+    del call.__wrapped__  # of which inspect.signature() knows nothing; the help begins with the arguments
     return call
 
 
-def _say_plainly(cls):
+def _say_plainly(cls, *methods):
     cls.__init__ = plain(cls.__init__, cls.__name__, bound=True)
-    for name, method in list(vars(cls).items()):
-        if not name.startswith("_") and inspect.isroutine(method) and not isinstance(method, staticmethod):
-            setattr(cls, name, plain(method, f"{cls.__name__}.{name}", bound=True))
+    for name in methods:
+        setattr(cls, name, plain(getattr(cls, name), cls.__name__ + ("" if name == "__call__" else "." + name), bound=True))
 
 
-# What is called some times a step, and no more: an op or a Var takes no detour.
-for _class in (_core.Adam, _core.AdamW, _core.SGD, _core.Lion, _core.Muon, _core.Average, _core.Schedule, _core.Context, _core.Init, _core.Op,
-               _core.Parameter, _core.Tape, _core.Tensor):
+# What is called some times a step, and no more: ops, Vars and leaves take no detour.
+for _class in (_core.Adam, _core.AdamW, _core.SGD, _core.Lion, _core.Muon):
+    _say_plainly(_class, "step", "load_state_dict")
+_say_plainly(_core.Schedule, "__call__")
+_say_plainly(_core.Tape, "backward")
+for _class in (_core.Average, _core.Context, _core.Init, _core.Op, _core.Parameter, _core.Tensor):
     _say_plainly(_class)
-_core.Schedule.__call__ = plain(_core.Schedule.__call__, "Schedule", bound=True)
 convert_joints, gradcheck, load_model, load_safetensors, save_safetensors, set_threads = (
     plain(getattr(_core, name), name) for name in
     ("convert_joints", "gradcheck", "load_model", "load_safetensors", "save_safetensors", "set_threads"))

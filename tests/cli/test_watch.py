@@ -87,6 +87,13 @@ class Watch(CliTest):
         process.wait(60)
         self.assertRegex(self.done("watch", "d"), "^d   1 done, 1 stopped\n")  # over: it ends by itself
 
+    def test_a_search_is_over_when_its_space_is(self):
+        self.write("s.yaml", "base: configs/tiny.yaml\nset: {stages: [deformation], deformation.optimiser.steps: 3}\n"
+                   "search: {kind: tpe, trials: 9, startup: 2, metric: deformation.skinning_mm, space: {deformation.optimiser.batch: {integer: [1, 2]}}}\n")
+        self.done("sweep", "run", "s.yaml", "--out", "d", "--jobs", "2")
+        self.assertEqual(self.live()["to_come"], 0)
+        self.assertRegex(self.done("watch", "d"), "^d   2 done\n")  # it ends, though nine were asked for
+
     def test_a_page_that_follows(self):
         process = self.running()
         follower = self.start("report", "d", "--out", "r.html", "--every", "1")

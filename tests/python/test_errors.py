@@ -284,3 +284,39 @@ def test_the_lock_of_python_is_free(walk):
     stop.set()
     worker.join()
     assert len(counted) > 10
+
+
+PARAMETERS = [restage.Parameter(np.eye(2))]
+
+
+@pytest.mark.parametrize("call, line", [
+    (lambda: restage.Adam(rate="x"), "Adam(): parameters is missing; give a Model, a dict or a list of Parameters"),
+    (lambda: restage.Adam(PARAMETERS, rate="x"), "Adam(): rate is 'x'; give a number"),
+    (lambda: restage.AdamW(PARAMETERS, rate=None), "AdamW(): rate is None; give a number"),
+    (lambda: restage.Muon(PARAMETERS, weight_decay=np.zeros((3, 2))), "Muon(): weight_decay is an array [3, 2]; give a number"),
+    (lambda: restage.SGD(PARAMETERS, momentun=0.9), "SGD() has no argument 'momentun'; did you mean 'momentum'?"),
+    (lambda: restage.Lion(PARAMETERS, 1, 2, 3, 4, 5, 6), "Lion() takes at most 5 arguments and was given 7; give parameters, rate, beta1, beta2, weight_decay"),
+    (lambda: restage.Adam(PARAMETERS, parameters=PARAMETERS), "Adam(): parameters is given twice, by its place and by its name; give it once"),
+    (lambda: restage.Adam(PARAMETERS).step(3), "Adam.step(): gradients is 3; give a restage.Gradients"),
+    (lambda: restage.Adam(PARAMETERS).step(restage.Tape().backward(3)), "Tape.backward(): loss is 3; give a restage.Var"),
+    (lambda: restage.Adam(PARAMETERS).load_state_dict([]), "Adam.load_state_dict(): state is []; give a dict"),
+    (lambda: restage.Schedule(2.5), "Schedule(): steps is 2.5; give a whole number"),
+    (lambda: restage.Schedule(10)("x"), "Schedule(): step is 'x'; give a whole number"),
+    (lambda: restage.Average(PARAMETERS, "x"), "Average(): decay is 'x'; give a number or None"),
+    (lambda: restage.Tape(3), "Tape() takes at most 0 arguments and was given 1; give none"),
+    (lambda: restage.Tensor(), "Tensor(): array is missing; give numbers, such as an array of NumPy"),
+    (lambda: restage.set_threads("x"), "set_threads(): n is 'x'; give a whole number"),
+    (lambda: restage.load_model(3), "load_model(): role is missing; give text"),
+])
+def test_a_wrong_argument_is_told_in_one_line(call, line):
+    with pytest.raises(restage.InputError) as error:
+        call()
+    assert str(error.value) == "restage: " + line
+    assert isinstance(error.value, TypeError) and "\n" not in str(error.value)
+
+
+def test_right_arguments_that_fail_say_what_they_said():
+    with pytest.raises(restage.InputError, match="nesterov needs a momentum"):
+        restage.SGD(PARAMETERS, nesterov=True)
+    with pytest.raises(TypeError, match="state_dict"):
+        __import__("copy").copy(restage.Adam(PARAMETERS))

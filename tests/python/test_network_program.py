@@ -8,6 +8,7 @@ import pytest
 import restage
 
 from conftest import LITE, PROGRAM, python
+from restage.__main__ import NETWORKS as NETWORKS_READ
 from test_network import NETWORKS, configuration, program
 
 
@@ -46,6 +47,36 @@ def test_the_program_tells_errors_of_networks_in_one_line(tmp_path):
     result = program("train", "--python", tmp_path)
     assert result.returncode == 2 and "is no file of Python" in result.stderr
     assert "--python FILE.py" in program("--help").stdout.strip().split("\n")[-1]
+
+
+def test_help_of_commands_that_read_networks_names_the_option():
+    tree = json.loads(subprocess.run([PROGRAM, "completion", "json"], capture_output=True, text=True).stdout)
+    names = [one["name"] for one in tree["commands"]] + ["%s %s" % (one["name"], part["name"]) for one in tree["commands"] for part in one["commands"]]
+    assert set(NETWORKS_READ) <= set(names)
+    with_weights = [one["name"] for one in tree["commands"] if any(option["name"] == "--weights" for option in one["options"])]
+    assert len(with_weights) > 4 and set(with_weights) <= set(NETWORKS_READ)
+    for words in (["retarget", "--help"], ["weights", "export", "-h"], ["sweep", "run", "--help"]):
+        assert "--python FILE.py" in program(*words).stdout.strip().split("\n")[-1], words
+    for words in (["doctor", "--help"], ["data", "build", "--help"], ["retarget"]):
+        assert "--python FILE.py" not in program(*words).stdout, words
+
+
+def test_info_has_a_row_for_each_layer():
+    rows = json.loads(program("info", "tiny/points", "--python", NETWORKS, "--json").stdout)
+    assert [(m["name"], m["kind"], m["output"], m["parameters"]) for m in rows["modules"]] == [
+        ("each.0", "Linear", "[..., 16]", 64), ("each.1", "Linear", "[..., 16]", 272), ("head.joints", "Linear", "[..., 66]", 1122)]
+    assert rows["parameters"] == 64 + 272 + 1122
+    text = program("info", "tiny/turns", "--python", NETWORKS).stdout
+    assert [line.split()[1:4:2] for line in text.split("\n")[4:8]] == [["gru", "GRU"], ["turn", "Linear"], ["path", "Linear"], ["all", "Turns"]]
+
+
+def test_weights_show_has_a_row_for_each_network(tmp_path):
+    (tmp_path / "mine.py").write_text(NETWORKS.read_text().replace('"tiny/', '"file/'))
+    path = configuration(tmp_path, "motion", "file/turns", more="python: [mine.py]\n")
+    run = json.loads(program("train", path, "--json").stdout)["run"]
+    shown = subprocess.run([PROGRAM, "weights", "show", run], capture_output=True, text=True).stdout
+    row, = [line for line in shown.split("\n") if "file/turns |" in line]
+    assert [cell.strip() for cell in row.strip("|").split("|")] == ["smrm", "file/turns", "7251", "mine.py"]
 
 
 @pytest.mark.parametrize("old, new, says", [
