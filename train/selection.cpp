@@ -37,12 +37,14 @@ void WeightAverage::add(int64_t done) {
 }
 
 void WeightAverage::mix(double keep) {
+  std::vector<MixArgs::Of> mixed;
   for (size_t i = 0; i < weights_.size(); ++i) {
     if (averaged_[i] && keep > 0)
-      launch(MixArgs{*weights_[i].value, average_[i], keep, 1 - keep});
+      mixed.push_back({*weights_[i].value, average_[i]});
     else
       average_[i] = weights_[i].value->clone();
   }
+  launch_all(MixArgs{mixed, keep, 1 - keep});
 }
 
 void WeightAverage::exchange() {

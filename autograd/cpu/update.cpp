@@ -20,16 +20,17 @@ namespace restage::cpu::HWY_NAMESPACE {
 namespace {
 
 template <class T>
-void adam_typed(const AdamArgs& args) {
+void adam_typed(const AdamArgs& args, const AdamArgs::Of& of) {
   const hn::ScalableTag<T> d;
   using V = hn::Vec<decltype(d)>;
-  const double c1 = 1.0 - std::pow(args.beta1, static_cast<double>(args.step));
-  const double c2 = 1.0 - std::pow(args.beta2, static_cast<double>(args.step));
+  const double c1 = 1.0 - std::pow(args.beta1, static_cast<double>(of.step));
+  const double c2 = 1.0 - std::pow(args.beta2, static_cast<double>(of.step));
   const auto number = [](double x) { return static_cast<T>(x); };
   const T step_size = number(args.lr / c1), root = number(1 / std::sqrt(c2)),
           eps = number(args.eps), b1 = number(args.beta1), b2 = number(args.beta2),
-          decay = number(args.weight_decay), gs = number(args.gradient_scale);
-  parallel_for(args.out.numel(), kGrain, [&](int64_t from, int64_t to) HWY_ATTR {
+          decay = number(args.weight_decay), gs = number(args.gradient_scale),
+          keep = number(args.keep);
+  parallel_for(of.out.numel(), kGrain, [&](int64_t from, int64_t to) HWY_ATTR {
     const hn::ScalableTag<T> tag;
     const auto all = [&](T x) HWY_ATTR { return hn::Set(tag, x); };
     const auto moments = [&](V& w, V& m, V& v, V gradient) HWY_ATTR {
@@ -41,9 +42,10 @@ void adam_typed(const AdamArgs& args) {
       const V scale = hn::MulAdd(hn::Sqrt(v), all(root), all(eps));
       return hn::Sub(w, hn::Div(hn::Mul(all(step_size), m), scale));
     };
-    T *w = args.out.data<T>() + from, *m = args.m.data<T>() + from, *v = args.v.data<T>() + from;
-    const T* g = args.gradient.data<T>() + from;
+    T *w = of.out.data<T>() + from, *m = of.m.data<T>() + from, *v = of.v.data<T>() + from;
+    const T* g = of.gradient.data<T>() + from;
     const auto step = [&](V& wv, V& mv, V& vv, V gv) HWY_ATTR {
+      wv = hn::Mul(all(keep), wv);
       moments(wv, mv, vv, gv);
       wv = move(wv, mv, vv);
     };
@@ -78,31 +80,35 @@ double squared_norm_typed(const T* x, int64_t n) {
 }
 
 template <class T>
-void mix_typed(const MixArgs& args) {
+void mix_typed(const MixArgs& args, const MixArgs::Of& of) {
   const T keep = static_cast<T>(args.keep), add = static_cast<T>(args.add);
-  parallel_for(args.out.numel(), kGrain, [&](int64_t from, int64_t to) HWY_ATTR {
+  parallel_for(of.out.numel(), kGrain, [&](int64_t from, int64_t to) HWY_ATTR {
     const hn::ScalableTag<T> tag;
     const auto step = [&](auto& y, auto x) HWY_ATTR {
       y = hn::MulAdd(hn::Set(tag, keep), y, hn::Mul(hn::Set(tag, add), x));
     };
-    update(to - from, step, args.out.data<T>() + from, args.x.data<T>() + from);
+    update(to - from, step, of.out.data<T>() + from, of.x.data<T>() + from);
   });
 }
 
 }  // namespace
 
 void squared_norm(const SquaredNormArgs& args) {
-  dispatch(args.x.dtype(), [&](auto zero) HWY_ATTR {
-    *args.out.data<double>() = squared_norm_typed(args.x.data<decltype(zero)>(), args.x.numel());
-  });
+  double* out = args.out.data<double>();
+  for (const Tensor& x : args.all)
+    dispatch(x.dtype(), [&](auto zero) HWY_ATTR {
+      *out++ = squared_norm_typed(x.data<decltype(zero)>(), x.numel());
+    });
 }
 
 void mix(const MixArgs& args) {
-  dispatch(args.out.dtype(), [&](auto zero) HWY_ATTR { mix_typed<decltype(zero)>(args); });
+  for (const MixArgs::Of& of : args.all)
+    dispatch(of.out.dtype(), [&](auto zero) HWY_ATTR { mix_typed<decltype(zero)>(args, of); });
 }
 
 void adam(const AdamArgs& args) {
-  dispatch(args.out.dtype(), [&](auto zero) HWY_ATTR { adam_typed<decltype(zero)>(args); });
+  for (const AdamArgs::Of& of : args.all)
+    dispatch(of.out.dtype(), [&](auto zero) HWY_ATTR { adam_typed<decltype(zero)>(args, of); });
 }
 
 }  // namespace restage::cpu::HWY_NAMESPACE

@@ -64,6 +64,29 @@ inline Tensor scratch(const Tensor& like, int64_t count) {
   return Tensor::empty({count}, DType::f64, like.device());
 }
 
+/// Several sums at once.
+template <int N>
+struct Sums {
+  static constexpr int kCount = N;
+  double of[N] = {};
+  RESTAGE_DEVICE void operator+=(const Sums& b) {
+    for (int k = 0; k < N; ++k) of[k] += b.of[k];
+  }
+};
+
+/// "Sum" of numbers that is the largest of them and where it is: the first of equal ones; NaN is
+/// larger than all others.
+template <class T>
+struct Largest {
+  T value = -INFINITY;
+  int32_t index = INT32_MAX;
+  RESTAGE_DEVICE void operator+=(const Largest& b) {
+    const bool nan = value != value, other = b.value != b.value;
+    const bool equal = nan ? other : value == b.value;
+    if (equal ? b.index < index : !nan && (other || b.value > value)) *this = b;
+  }
+};
+
 /// Threads that work on one thing together.
 struct Group {
 #ifdef __CUDACC__
@@ -80,46 +103,30 @@ struct Group {
     for (int64_t i = n; i-- > 0;) f(i);
   }
 #endif
-  /// Sum of f(i) over i below n, in an order that n alone decides. All threads get the sum.
-  template <class F>
-  RESTAGE_DEVICE double sum(int64_t n, F f) const {
-    double* parts = room;
-    each(kThreads, [&](int64_t t) {
-      double s = 0;
-      for (int64_t i = t; i < n; i += kThreads) s += f(i);
-      parts[t] = s;
-    });
-    for (int64_t half = kThreads / 2; half > 0; half /= 2)
-      each(half, [&](int64_t t) { parts[t] += parts[t + half]; });
-    const double total = parts[0];
-    each(0, [](int64_t) {});  // no thread writes before all threads have read
-    return total;
-  }
-  /// The i below n of the largest f(i), the first of equal ones; 0 if all are NaN.
-  template <class F>
-  RESTAGE_DEVICE int64_t first_largest(int64_t n, F f) const {
-    double* best = room;
-    double* which = room + kThreads;
-    each(kThreads, [&](int64_t t) {
-      double top = -INFINITY;
-      int64_t index = n;
-      for (int64_t i = t; i < n; i += kThreads) {
-        const double x = f(i);
-        if (x > top) top = x, index = i;
-      }
-      best[t] = top;
-      which[t] = static_cast<double>(index);
-    });
-    for (int64_t half = kThreads / 2; half > 0; half /= 2)
-      each(half, [&](int64_t t) {
-        const double b = best[t + half], w = which[t + half];
-        if (b > best[t] || (b == best[t] && w < which[t])) best[t] = b, which[t] = w;
+  /// The f(i) of all i below n added up by +=, from S() on, in an order that n alone decides. All
+  /// threads get the sum.
+  template <class S = double, class F>
+  RESTAGE_DEVICE S sum(int64_t n, F f) const {
+    if constexpr (sizeof(S) > kRoom) {  // Sums, one after the other
+      S out;
+      for (int k = 0; k < S::kCount; ++k) out.of[k] = sum(n, [&](int64_t i) { return f(i).of[k]; });
+      return out;
+    } else {
+      S* parts = reinterpret_cast<S*>(room);
+      each(kThreads, [&](int64_t t) {
+        S s{};
+        for (int64_t i = t; i < n; i += kThreads) s += f(i);
+        parts[t] = s;
       });
-    const auto index = static_cast<int64_t>(which[0]);
-    each(0, [](int64_t) {});
-    return index < n ? index : 0;
+      for (int64_t half = kThreads / 2; half > 0; half /= 2)
+        each(half, [&](int64_t t) { parts[t] += parts[t + half]; });
+      const S total = parts[0];
+      each(0, [](int64_t) {});  // no thread writes before all threads have read
+      return total;
+    }
   }
-  double* room;  ///< 2 * kThreads numbers
+  static constexpr size_t kRoom = 2 * sizeof(double);  ///< of a thread
+  double* room;                                        ///< 2 * kThreads numbers
 };
 
 #ifdef __CUDACC__

@@ -30,82 +30,94 @@ void modulate_of(const ModulateArgs& a) {
   });
 }
 
-/// The gradient before the activation [n, v, c].
+/// A pass as a kernel sees it.
 template <class T>
-Tensor before_activation(const ModulateGradArgs& a) {
-  if (a.activation != Activation::relu) return a.gy;
-  const int64_t v = a.mesh.size(1), c = a.x.size(2), rows_of_x = a.x.size(1);
-  const T *x = at<T>(a.x), *mesh = at<T>(a.mesh), *gy = at<T>(a.gy);
-  const AffineOfPoint<T> factor{at<T>(a.scale), at<T>(a.scale_bias)},
-      shift{at<T>(a.shift), at<T>(a.shift_bias)};
-  Tensor out = empty_like(a.gy);
-  T* g = at<T>(out);
-  rows(a.x.size(0) * v, c, [=] RESTAGE_DEVICE(int64_t r, int64_t i) {
-    const int64_t from = rows_of_x == v ? r : r / v;
-    const T y = factor.at(mesh + 3 * r, i) * x[from * c + i] + shift.at(mesh + 3 * r, i);
-    g[r * c + i] = y <= 0 ? T(0) : gy[r * c + i];
-  });
-  return out;
-}
-
-/// Gradients of one weight and its bias, of sums over all points of `of(row, channel)`.
-template <class T, class F>
-void weight_grad(const ModulateGradArgs& a, const T* mesh, T* weight, T* bias, F of) {
-  const int64_t all = a.mesh.size(0) * a.mesh.size(1), c = a.x.size(2);
-  for (int64_t k = 0; k < 3; ++k)
-    sums(
-        a.out, 1, all, c,
-        [=] RESTAGE_DEVICE(int64_t, int64_t r, int64_t i) { return of(r, i) * mesh[3 * r + k]; },
-        [=] RESTAGE_DEVICE(int64_t i, double total) { weight[3 * i + k] = static_cast<T>(total); });
-  sums(
-      a.out, 1, all, c, [=] RESTAGE_DEVICE(int64_t, int64_t r, int64_t i) { return of(r, i); },
-      [=] RESTAGE_DEVICE(int64_t i, double total) { bias[i] = static_cast<T>(total); });
-}
+struct Modulated {
+  explicit Modulated(const ModulateGradArgs& a)
+      : x(at<T>(a.x)),
+        mesh(at<T>(a.mesh)),
+        gy(at<T>(a.gy)),
+        factor{at<T>(a.scale), at<T>(a.scale_bias)},
+        shift{at<T>(a.shift), at<T>(a.shift_bias)},
+        c(a.x.size(2)),
+        points_of_x(a.x.size(1) == a.mesh.size(1) ? 1 : a.mesh.size(1)),
+        relu(a.activation == Activation::relu) {}
+  RESTAGE_DEVICE T input(int64_t r, int64_t i) const {
+    return x[(points_of_x == 1 ? r : r / points_of_x) * c + i];
+  }
+  /// The gradient before the activation, at a point and a channel.
+  RESTAGE_DEVICE T gradient(int64_t r, int64_t i) const {
+    const T* point = mesh + 3 * r;
+    const bool off = relu && factor.at(point, i) * input(r, i) + shift.at(point, i) <= T(0);
+    return off ? T(0) : gy[r * c + i];
+  }
+  const T *x, *mesh, *gy;
+  AffineOfPoint<T> factor, shift;
+  int64_t c, points_of_x;
+  bool relu;
+};
 
 template <class T>
-void mesh_grad(const ModulateGradArgs& a, const T* g) {
-  const int64_t v = a.mesh.size(1), c = a.x.size(2), rows_of_x = a.x.size(1);
-  const T *x = at<T>(a.x), *scale = at<T>(a.scale), *shift = at<T>(a.shift);
+void mesh_grad(const ModulateGradArgs& a, const Modulated<T>& of) {
+  const T *scale = of.factor.weight, *shift = of.shift.weight;
   T* out = at<T>(*a.g_mesh);
-  each(3 * a.mesh.size(0) * v, [=] RESTAGE_DEVICE(int64_t n) {
-    const int64_t r = n / 3, k = n % 3, from = rows_of_x == v ? r : r / v;
-    double total = 0;
-    for (int64_t i = 0; i < c; ++i)
-      total += static_cast<double>(g[r * c + i] *
-                                   (x[from * c + i] * scale[3 * i + k] + shift[3 * i + k]));
-    out[n] = static_cast<T>(total);
-  });
+  sums<Sums<3>>(
+      a.out, a.mesh.size(0) * a.mesh.size(1), of.c, 1,
+      [=] RESTAGE_DEVICE(int64_t r, int64_t i, int64_t) {
+        const T g = of.gradient(r, i), x = of.input(r, i);
+        Sums<3> s;
+        for (int k = 0; k < 3; ++k)
+          s.of[k] = static_cast<double>(g * (x * scale[3 * i + k] + shift[3 * i + k]));
+        return s;
+      },
+      [=] RESTAGE_DEVICE(int64_t r, const Sums<3>& total) {
+        for (int k = 0; k < 3; ++k) out[3 * r + k] = static_cast<T>(total.of[k]);
+      });
+}
+
+/// Gradients of both weights and biases: eight sums over all points.
+template <class T>
+void weight_grads(const ModulateGradArgs& a, const Modulated<T>& of) {
+  T *g_scale = at<T>(a.g_scale), *g_scale_bias = at<T>(a.g_scale_bias), *g_shift = at<T>(a.g_shift),
+    *g_shift_bias = at<T>(a.g_shift_bias);
+  sums<Sums<8>>(
+      a.out, 1, a.mesh.size(0) * a.mesh.size(1), of.c,
+      [=] RESTAGE_DEVICE(int64_t, int64_t r, int64_t i) {
+        const double g = static_cast<double>(of.gradient(r, i)),
+                     gx = g * static_cast<double>(of.input(r, i));
+        const T* p = of.mesh + 3 * r;
+        return Sums<8>{{gx * p[0], gx * p[1], gx * p[2], gx, g * p[0], g * p[1], g * p[2], g}};
+      },
+      [=] RESTAGE_DEVICE(int64_t i, const Sums<8>& total) {
+        for (int k = 0; k < 3; ++k) {
+          g_scale[3 * i + k] = static_cast<T>(total.of[k]);
+          g_shift[3 * i + k] = static_cast<T>(total.of[4 + k]);
+        }
+        g_scale_bias[i] = static_cast<T>(total.of[3]);
+        g_shift_bias[i] = static_cast<T>(total.of[7]);
+      });
 }
 
 template <class T>
 void modulate_grad_of(const ModulateGradArgs& a) {
-  const int64_t n = a.x.size(0), v = a.mesh.size(1), c = a.x.size(2), rows_of_x = a.x.size(1);
-  const Tensor before = before_activation<T>(a);
-  const T *x = at<T>(a.x), *mesh = at<T>(a.mesh), *g = at<T>(before);
+  const int64_t n = a.x.size(0), v = a.mesh.size(1), c = a.x.size(2);
+  const Modulated<T> of(a);
   T* out = at<T>(a.out);
-  const AffineOfPoint<T> factor{at<T>(a.scale), at<T>(a.scale_bias)};
-  if (rows_of_x == v) {
+  if (of.points_of_x == 1) {
     rows(n * v, c, [=] RESTAGE_DEVICE(int64_t r, int64_t i) {
-      out[r * c + i] = g[r * c + i] * factor.at(mesh + 3 * r, i);
+      out[r * c + i] = of.gradient(r, i) * of.factor.at(of.mesh + 3 * r, i);
     });
   } else {
     sums(
         a.out, n, v, c,
         [=] RESTAGE_DEVICE(int64_t o, int64_t p, int64_t i) {
           const int64_t r = o * v + p;
-          return static_cast<double>(g[r * c + i] * factor.at(mesh + 3 * r, i));
+          return static_cast<double>(of.gradient(r, i) * of.factor.at(of.mesh + 3 * r, i));
         },
         [=] RESTAGE_DEVICE(int64_t k, double total) { out[k] = static_cast<T>(total); });
   }
-  weight_grad(a, mesh, at<T>(a.g_scale), at<T>(a.g_scale_bias),
-              [=] RESTAGE_DEVICE(int64_t r, int64_t i) {
-                const int64_t from = rows_of_x == v ? r : r / v;
-                return static_cast<double>(g[r * c + i]) * static_cast<double>(x[from * c + i]);
-              });
-  weight_grad(
-      a, mesh, at<T>(a.g_shift), at<T>(a.g_shift_bias),
-      [=] RESTAGE_DEVICE(int64_t r, int64_t i) { return static_cast<double>(g[r * c + i]); });
-  if (a.g_mesh != nullptr) mesh_grad<T>(a, g);
+  weight_grads<T>(a, of);
+  if (a.g_mesh != nullptr) mesh_grad<T>(a, of);
 }
 
 template <class T>

@@ -55,14 +55,16 @@ void norm_grad_of(const NormGradArgs& args) {
   const Factor<T> scale{at<T>(args.scale), args.affine, 1};
   Tensor room = scratch(args.out, 2 * columns);
   double *g_sum = at<double>(room), *gx_sum = g_sum + columns;
-  sums(args.out, outer, n, inner, g_sum, [=] RESTAGE_DEVICE(int64_t o, int64_t r, int64_t i) {
-    return static_cast<double>(gy[(o * n + r) * inner + i]) * scale.at(r, i);
-  });
-  sums(args.out, outer, n, inner, gx_sum, [=] RESTAGE_DEVICE(int64_t o, int64_t r, int64_t i) {
-    const int64_t k = (o * n + r) * inner + i, c = o * inner + i;
-    return static_cast<double>(gy[k]) * scale.at(r, i) *
-           ((static_cast<double>(x[k]) - mean[c]) * rstd[c]);
-  });
+  sums<Sums<2>>(
+      args.out, outer, n, inner,
+      [=] RESTAGE_DEVICE(int64_t o, int64_t r, int64_t i) {
+        const int64_t k = (o * n + r) * inner + i, c = o * inner + i;
+        const double g = static_cast<double>(gy[k]) * scale.at(r, i);
+        return Sums<2>{{g, g * ((static_cast<double>(x[k]) - mean[c]) * rstd[c])}};
+      },
+      [=] RESTAGE_DEVICE(int64_t k, const Sums<2>& total) {
+        g_sum[k] = total.of[0], gx_sum[k] = total.of[1];
+      });
   const double inv = n > 0 ? 1.0 / static_cast<double>(n) : 0;
   rows(outer * n, inner, [=] RESTAGE_DEVICE(int64_t row, int64_t i) {
     const int64_t r = row % n, c = row / n * inner + i, k = row * inner + i;
@@ -76,19 +78,16 @@ void norm_grad_of(const NormGradArgs& args) {
                 blocks = args.affine == Affine::inner ? n : outer;
   const bool by_inner = args.affine == Affine::inner;
   T *g_scale = at<T>(args.g_scale), *g_shift = at<T>(args.g_shift);
-  sums(
+  sums<Sums<2>>(
       args.out, 1, blocks, width,
       [=] RESTAGE_DEVICE(int64_t, int64_t r, int64_t i) {
         const int64_t k = r * width + i, c = by_inner ? i : r;
-        return static_cast<double>(gy[k]) * ((static_cast<double>(x[k]) - mean[c]) * rstd[c]);
+        const double g = static_cast<double>(gy[k]);
+        return Sums<2>{{g, g * ((static_cast<double>(x[k]) - mean[c]) * rstd[c])}};
       },
-      [=] RESTAGE_DEVICE(int64_t k, double total) { g_scale[k] = static_cast<T>(total); });
-  sums(
-      args.out, 1, blocks, width,
-      [=] RESTAGE_DEVICE(int64_t, int64_t r, int64_t i) {
-        return static_cast<double>(gy[r * width + i]);
-      },
-      [=] RESTAGE_DEVICE(int64_t k, double total) { g_shift[k] = static_cast<T>(total); });
+      [=] RESTAGE_DEVICE(int64_t k, const Sums<2>& total) {
+        g_shift[k] = static_cast<T>(total.of[0]), g_scale[k] = static_cast<T>(total.of[1]);
+      });
 }
 
 }  // namespace

@@ -59,11 +59,12 @@ void fps_of(const FpsArgs& args) {
         const T old = fresh ? start : best[i], far = squared_distance(x + 3 * i, from);
         best[i] = far < old ? far : old;
       });
-      return g.first_largest(v, [&](int64_t i) { return static_cast<double>(best[i]); });
+      const auto far = [&](int64_t i) { return Largest<T>{best[i], static_cast<int32_t>(i)}; };
+      return g.sum<Largest<T>>(v, far).index;
     };
-    int64_t current = farthest(centre, true, static_cast<T>(INFINITY));
+    int32_t current = farthest(centre, true, static_cast<T>(INFINITY));
     for (int64_t k = 0; k < m; ++k) {
-      g.each(1, [&](int64_t) { out[s * m + k] = static_cast<int32_t>(current); });
+      g.each(1, [&](int64_t) { out[s * m + k] = current; });
       if (k + 1 < m) current = farthest(x + 3 * current, k == 0, static_cast<T>(1e10));
     }
   });

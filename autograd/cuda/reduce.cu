@@ -25,18 +25,15 @@ void max_of(const MaxArgs& args) {
   T* out = at<T>(args.out);
   int32_t* index = at<int32_t>(args.index);
   const int64_t n = args.n, inner = args.inner;
-  each(args.outer * inner, [=] RESTAGE_DEVICE(int64_t k) {
-    const T* column = x + k / inner * n * inner + k % inner;
-    T best = column[0];
-    int32_t which = 0;
-    for (int64_t r = 1; r < n; ++r) {
-      const T v = column[r * inner];
-      if (v > best || (v != v && best == best))
-        best = v, which = static_cast<int32_t>(r);  // NaN wins
-    }
-    out[k] = best;
-    index[k] = which;
-  });
+  sums<Largest<T>>(
+      args.out, args.outer, n, inner,
+      [=] RESTAGE_DEVICE(int64_t o, int64_t r, int64_t i) {
+        return Largest<T>{x[(o * n + r) * inner + i], static_cast<int32_t>(r)};
+      },
+      [=] RESTAGE_DEVICE(int64_t k, const Largest<T>& top) {
+        out[k] = top.value;
+        index[k] = top.index;
+      });
 }
 
 template <class T>
@@ -61,7 +58,7 @@ void softmax_of_rows(const SoftmaxArgs& args) {
   groups(args.outer, [=] RESTAGE_DEVICE(const Group& g, int64_t o) {
     const T* from = x + o * n;
     T* to = out + o * n;
-    const T top = from[g.first_largest(n, [&](int64_t r) { return static_cast<double>(from[r]); })];
+    const T top = g.sum<Largest<T>>(n, [&](int64_t r) { return Largest<T>{from[r], 0}; }).value;
     const T all = static_cast<T>(g.sum(n, [&](int64_t r) {
       const T e = exp(from[r] - top);
       to[r] = e;

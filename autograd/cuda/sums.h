@@ -1,4 +1,5 @@
-// Sums over the middle axis of [outer, n, inner], in double, in an order that sizes decide.
+// Sums over the middle axis of [outer, n, inner], in an order that sizes decide. S is what is added
+// up: double, Sums or Largest.
 #pragma once
 
 #include "autograd/cuda/device_code.h"
@@ -18,14 +19,14 @@ struct RowsOfASum {
 };
 
 /// write((o * parts + p) * inner + i, sum of f(o, r, i) over the rows r of part p).
-template <class F, class Write>
+template <class S = double, class F, class Write>
 void sum_parts(int64_t outer, int64_t n, int64_t inner, const RowsOfASum& cut, F f, Write write) {
   const int64_t parts = cut.parts, length = cut.length;
   if (cut.by_group) {
     groups(outer * parts * inner, [=] RESTAGE_DEVICE(const Group& g, int64_t k) {
       const int64_t o = k / (parts * inner), first = k / inner % parts * length, i = k % inner,
                     count = n - first < length ? n - first : length;
-      const double total = g.sum(count, [&](int64_t r) { return f(o, first + r, i); });
+      const S total = g.sum<S>(count, [&](int64_t r) { return f(o, first + r, i); });
       g.each(1, [&](int64_t) { write(k, total); });
     });
     return;
@@ -33,7 +34,7 @@ void sum_parts(int64_t outer, int64_t n, int64_t inner, const RowsOfASum& cut, F
   each(outer * parts * inner, [=] RESTAGE_DEVICE(int64_t k) {
     const int64_t o = k / (parts * inner), first = k / inner % parts * length, i = k % inner,
                   end = n - first < length ? n : first + length;
-    double total = 0;
+    S total{};
     for (int64_t r = first; r < end; ++r) total += f(o, r, i);
     write(k, total);
   });
@@ -41,19 +42,20 @@ void sum_parts(int64_t outer, int64_t n, int64_t inner, const RowsOfASum& cut, F
 
 /// write(o * inner + i, sum of f(o, r, i) over r below n). The parts of long sums are added up at
 /// the end.
-template <class F, class Write>
+template <class S = double, class F, class Write>
 void sums(const Tensor& like, int64_t outer, int64_t n, int64_t inner, F f, Write write) {
   RowsOfASum cut(outer, n, inner);
-  if (cut.parts == 1) return sum_parts(outer, n, inner, cut, f, write);
+  if (cut.parts == 1) return sum_parts<S>(outer, n, inner, cut, f, write);
   const int64_t parts = cut.parts;
-  Tensor partial = scratch(like, outer * parts * inner);
-  double* part = at<double>(partial);
-  sum_parts(outer, n, inner, cut, f,
-            [=] RESTAGE_DEVICE(int64_t k, double total) { part[k] = total; });
+  constexpr int64_t kDoubles = sizeof(S) / sizeof(double);
+  Tensor partial = scratch(like, outer * parts * inner * kDoubles);
+  S* part = reinterpret_cast<S*>(at<double>(partial));
+  sum_parts<S>(outer, n, inner, cut, f,
+               [=] RESTAGE_DEVICE(int64_t k, const S& total) { part[k] = total; });
   cut.by_group = parts > 64;
   cut.length = parts;
   cut.parts = 1;
-  sum_parts(
+  sum_parts<S>(
       outer, parts, inner, cut,
       [=] RESTAGE_DEVICE(int64_t o, int64_t p, int64_t i) {
         return part[(o * parts + p) * inner + i];

@@ -103,8 +103,7 @@ const Tensor* Gradients::find(const Var& inner) const {
   return inner.link != link_ || it == inner_.end() ? nullptr : &it->second;
 }
 
-/// Computes the sums of squares that are not known yet: all are launched before the first is waited
-/// for.
+/// Computes the sums of squares that are not known yet, and waits for them once.
 void Gradients::measure(std::span<const uint64_t> ids) const {
   std::vector<const Leaf*> open;
   for (const uint64_t id : ids) {
@@ -114,12 +113,10 @@ void Gradients::measure(std::span<const uint64_t> ids) const {
     if (!leaf.squares || leaf.version != leaf.gradient.version()) open.push_back(&leaf);
   }
   if (open.empty()) return;
-  const Tensor sums =
-      Tensor::empty({std::ssize(open)}, DType::f64, open.front()->gradient.device());
-  for (size_t i = 0; i < open.size(); ++i) {
-    Tensor one = sums.rows(static_cast<int64_t>(i), static_cast<int64_t>(i) + 1);
-    launch(SquaredNormArgs{open[i]->gradient, one});
-  }
+  std::vector<Tensor> gradients;
+  for (const Leaf* leaf : open) gradients.push_back(leaf->gradient);
+  Tensor sums = Tensor::empty({std::ssize(open)}, DType::f64, gradients.front().device());
+  launch(SquaredNormArgs{gradients, sums});
   const Tensor known = sums.cpu();
   for (size_t i = 0; i < open.size(); ++i) {
     open[i]->squares = known.item(static_cast<int64_t>(i));

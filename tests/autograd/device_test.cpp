@@ -7,10 +7,13 @@
 
 #include "autograd/gradcheck/evaluate.h"
 #include "autograd/gradcheck/gradcheck.h"
+#include "autograd/kernels/reduce.h"
+#include "autograd/kernels/update.h"
 #include "autograd/ops/attention.h"
 #include "autograd/ops/elementwise.h"
 #include "autograd/ops/layout.h"
 #include "autograd/ops/linear.h"
+#include "autograd/ops/modulate.h"
 #include "autograd/ops/points.h"
 #include "autograd/ops/pooled_norm.h"
 #include "autograd/ops/reduce.h"
@@ -231,6 +234,83 @@ TEST(Device, TheGpusGruMakesItsProductsInParts) {
                                    0.25),
                      [](const auto& x) { return gru(x[0], x[1], x[2], x[3], x[4], x[5]); });
   }
+}
+
+TEST(Device, TheGpusMaximumIsTheFirstOfManyLikeIt) {
+  for (const int64_t n : {3, 70, 1200})
+    for (const int64_t inner : {1, 5, 40}) {
+      Rng rng(RngKey{3, static_cast<uint64_t>(n * inner)});
+      Tensor x = Tensor::empty({2, n, inner});
+      for (int64_t i = 0; i < x.numel(); ++i)
+        x.data<float>()[i] = static_cast<float>(rng.below(3)) - 3;
+      for (const int64_t row : {n - 2, n - 1}) x.data<float>()[row * inner] = NAN;
+      const auto largest = [&](Device device) {
+        const Tensor there = x.to(device);
+        Tensor value = empty_like(there, {2, inner}),
+               index = Tensor::empty({2, inner}, DType::i32, device);
+        launch(MaxArgs{there, value, index, 2, n, inner});
+        return std::pair{value.cpu(), index.cpu()};
+      };
+      const auto [value, index] = largest({});
+      EXPECT_EQ(index.item(0), n - 2) << "the first NaN";
+      const auto [value_there, index_there] = largest(emulated_gpu());
+      EXPECT_TRUE(same_bits(value_there, value)) << n << " " << inner;
+      EXPECT_TRUE(same_bits(index_there, index)) << n << " " << inner;
+    }
+}
+
+TEST(Device, TheGpusModulationSumsInParts) {
+  // Channels by threads and by groups of threads; values that are the same at all points.
+  for (const auto& [v, c, of_x] : {std::tuple{600, 40, 600}, {80, 5, 80}, {600, 70, 1}}) {
+    SCOPED_TRACE(c);
+    expect_agreement(normal_inputs({Shape{2, of_x, c}, Shape{2, v, 3}, Shape{c, 3}, Shape{c},
+                                    Shape{c, 3}, Shape{c}}),
+                     [](const auto& x) {
+                       return modulate(x[0], x[1], x[2], x[3], x[4], x[5], Activation::relu);
+                     });
+  }
+}
+
+/// Tensors of a network of more layers than a launch takes: none, few and many numbers, of both
+/// types.
+std::vector<Tensor> layers(Device device, double deviation) {
+  std::vector<Shape> shapes;
+  for (int64_t i = 0; i < 600; ++i) shapes.push_back({i == 7 ? 9000 : i % 9});
+  std::vector<Tensor> out = normal_inputs(shapes, deviation);
+  for (size_t i = 0; i < out.size(); ++i)
+    out[i] = out[i].cast(i % 5 == 0 ? DType::f64 : DType::f32).to(device);
+  return out;
+}
+
+/// What an optimiser's kernels make of them: norms, then weights, moments and averages.
+std::vector<Tensor> updated(Device device) {
+  const std::vector<Tensor> gradients = layers(device, 2);
+  std::vector<Tensor> w = layers(device, 1), m = layers(device, 0.1), v = layers(device, 0),
+                      average = layers(device, 3);
+  std::vector<AdamArgs::Of> moved;
+  std::vector<MixArgs::Of> mixed;
+  for (size_t i = 0; i < w.size(); ++i) {
+    moved.push_back({gradients[i], w[i], m[i], v[i], static_cast<int64_t>(1 + i % 3)});
+    mixed.push_back({w[i], average[i]});
+  }
+  std::vector<Tensor> out{Tensor::empty({std::ssize(w)}, DType::f64, device)};
+  launch(SquaredNormArgs{gradients, out[0]});
+  launch_all(AdamArgs{moved, 0.1, 0.9, 0.99, 1e-3, 0.1, 0.5, 0.8});
+  launch_all(MixArgs{mixed, 0.75, 0.25});
+  for (const auto* part : {&w, &m, &v, &average}) out.insert(out.end(), part->begin(), part->end());
+  for (Tensor& t : out) t = t.cpu();
+  return out;
+}
+
+TEST(Device, TheGpuGoesOverAllTensorsOfAnOptimiserAtOnce) {
+  const std::vector<Tensor> here = updated({});
+  const int64_t before = emulated_counts().kernels;
+  const std::vector<Tensor> there = updated(emulated_gpu());
+  EXPECT_EQ(emulated_counts().kernels, before + 3);
+  for (size_t t = 0; t < here.size(); ++t)
+    for (int64_t i = 0; i < here[t].numel(); ++i)
+      ASSERT_NEAR(there[t].item(i), here[t].item(i), 1e-5 * (1 + std::abs(here[t].item(i))))
+          << "tensor " << t << ", number " << i;
 }
 
 TEST(Device, AKernelThatItLacksIsNamed) {

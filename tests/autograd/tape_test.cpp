@@ -473,7 +473,8 @@ TEST(ChangedInPlace, AnOptimiserBetweenThePassesIsCaught) {
   Tape tape;
   const Var x = tape.leaf(Tensor::full({3, 2}, 1), 2);
   const Var loss = sum_all(linear(x, tape.leaf(w, 1)));
-  launch(AdamArgs{g, w, m, v, 0.1, 0.9, 0.999, 1e-8, 0, 1, 1});
+  const AdamArgs::Of moved[] = {{g, w, m, v, 1}};
+  launch_all(AdamArgs{moved, 0.1, 0.9, 0.999, 1e-8, 0, 1});
   expect_error<Error>([&] { tape.backward(loss); }, {"'linear'", "changed"});
 }
 

@@ -244,8 +244,9 @@ void expect_adam_f32(const std::string& name, const AdamConfig& c, Device device
   Tensor w = numbers(3), m = Tensor::zeros({7}, DType::f32, device), v = m.clone();
   const auto want = [&](const std::string& of) { return golden("adam_f32").at(of, "adam_f32"); };
   for (int i = 0; i < 50; ++i) {
-    launch(AdamArgs{numbers(10 + static_cast<uint32_t>(i)), w, m, v, 1e-2, c.beta1, c.beta2, c.eps,
-                    c.weight_decay, 1, i + 1});
+    const Tensor gradient = numbers(10 + static_cast<uint32_t>(i));
+    const AdamArgs::Of moved[] = {{gradient, w, m, v, i + 1}};
+    launch_all(AdamArgs{moved, 1e-2, c.beta1, c.beta2, c.eps, c.weight_decay, 1});
     const std::string step = name + "." + std::to_string(i);
     for (int64_t k = 0; k < 7; ++k) ASSERT_NEAR(w.cpu().item(k), want(step).item(k), 2e-6) << step;
   }

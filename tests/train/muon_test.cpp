@@ -12,6 +12,7 @@
 #include "autograd/base/rng.h"
 #include "autograd/gradcheck/evaluate.h"
 #include "nn/layers/linear.h"
+#include "tests/support/emulated_gpu.h"
 #include "tests/support/errors.h"
 #include "tests/support/files.h"
 #include "tests/train/tiny_training.h"
@@ -102,6 +103,21 @@ TEST(Muon, StepsAlongTheOrthogonalisedMomentumByAdamsSize) {
     EXPECT_NEAR(step.norm() / std::sqrt(40 * 64), rate * config.step, 0.2 * rate * config.step);
     w = matrix_of(layer.weight.value);
   }
+}
+
+TEST(Muon, StepsOnADeviceWithoutWaitingForIt) {
+  const auto moved = [](Device device) {
+    Linear layer(64, 40, Init{RngKey{1, 0}, DType::f64}, false);
+    move_module(layer, device);
+    Muon muon(named_parameters({{"", &layer}}), {});
+    Gradients g;
+    g.set(layer.weight.id, random_matrix(40, 64, 10).to(device));
+    const int64_t before = emulated_counts().waits;
+    muon.step(g, 1e-2, 0.5);
+    EXPECT_EQ(emulated_counts().waits, before);
+    return matrix_of(layer.weight.value.cpu());
+  };
+  EXPECT_LT((moved(emulated_gpu()) - moved({})).norm(), 1e-12);
 }
 
 /// A weight moves alike, whatever axes of one follow, beside others of its shape or alone.

@@ -9,15 +9,13 @@ Adam::Adam(const std::vector<NamedParameter>& parameters, const AdamConfig& conf
 
 void Adam::step(const Gradients& gradients, double rate, double scale) {
   const bool apart = decay_ == Decay::of_weights;
-  for (Slot& s : slots_) {
-    Parameter& p = *s.of.parameter;
-    const Tensor* g = gradients.find(p.id);
-    if (g == nullptr) continue;
-    ++s.steps;
-    if (apart) decay_weights(p.value, rate, config_.weight_decay);
-    launch(AdamArgs{*g, p.value, s.m, s.v, rate, config_.beta1, config_.beta2, config_.eps,
-                    apart ? 0 : config_.weight_decay, scale, s.steps});
-  }
+  std::vector<AdamArgs::Of> moving;
+  for (Slot& s : slots_)
+    if (const Tensor* g = gradients.find(s.of.parameter->id))
+      moving.push_back({*g, s.of.parameter->value, s.m, s.v, ++s.steps});
+  launch_all(AdamArgs{moving, rate, config_.beta1, config_.beta2, config_.eps,
+                      apart ? 0 : config_.weight_decay, scale,
+                      apart ? 1 - rate * config_.weight_decay : 1});
 }
 
 }  // namespace restage

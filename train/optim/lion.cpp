@@ -26,10 +26,10 @@ void Lion::step(const Gradients& gradients, double rate, double scale) {
     const Tensor* g = gradients.find(s.of.parameter->id);
     if (g == nullptr) continue;
     Tensor direction = times(s.m, config_.beta1);
-    launch(MixArgs{*g, direction, 1, (1 - config_.beta1) * scale});
+    mix(*g, direction, 1, (1 - config_.beta1) * scale);
     decay_weights(p, rate, config_.weight_decay);
-    launch(MixArgs{signs_of(direction), p, 1, -rate});
-    launch(MixArgs{*g, s.m, config_.beta2, (1 - config_.beta2) * scale});
+    mix(signs_of(direction), p, 1, -rate);
+    mix(*g, s.m, config_.beta2, (1 - config_.beta2) * scale);
   }
 }
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "autograd/kernels/elementwise.h"
 #include "autograd/kernels/matmul.h"
 #include "autograd/kernels/update.h"
 
@@ -10,6 +11,7 @@ namespace restage {
 namespace {
 
 constexpr int kIterations = 5;
+constexpr double kLeastNorm = 1e-30;  // float32 has its inverse
 // s -> a s + b s^3 + c s^5 for every singular value s: Jordan's coefficients, which let small
 // singular values grow fastest and keep all of them near one, not at one.
 constexpr double kA = 3.4445, kB = -4.7750, kC = 2.0315;
@@ -24,34 +26,37 @@ Tensor product(const Tensor& a, const Tensor& b, Transposed which = Transposed::
   return out;
 }
 
-/// The norm of each matrix of x [n, rows, columns].
-std::vector<double> norms_of(const Tensor& x) {
-  const Tensor squares = Tensor::empty({x.size(0)}, DType::f64, x.device());
-  for (int64_t i = 0; i < x.size(0); ++i) {
-    Tensor one = squares.rows(i, i + 1);
-    launch(SquaredNormArgs{x.rows(i, i + 1), one});
-  }
-  std::vector<double> out = squares.cpu().to_vector<double>();
-  for (double& square : out) square = std::sqrt(square);
+/// The matrices of x [n, rows, columns], which share its memory.
+std::vector<Tensor> matrices_of(const Tensor& x) {
+  std::vector<Tensor> out;
+  for (int64_t i = 0; i < x.size(0); ++i) out.push_back(x.rows(i, i + 1));
+  return out;
+}
+
+/// The same, each divided by its norm, where that is not zero.
+Tensor normalised(const Tensor& x) {
+  const auto number = [&](double value) { return Tensor::full({}, value, DType::f64, x.device()); };
+  Tensor squares = Tensor::empty({x.size(0), 1, 1}, DType::f64, x.device()),
+         norms = empty_like(squares), some = empty_like(squares), inverse = empty_like(squares),
+         out = empty_like(x);
+  launch(SquaredNormArgs{matrices_of(x), squares});
+  launch(UnaryArgs{Unary::sqrt, squares, norms});
+  launch(BinaryArgs{Binary::maximum, norms, number(kLeastNorm), some});
+  launch(BinaryArgs{Binary::div, number(1), some, inverse});
+  launch(BinaryArgs{Binary::mul, x, inverse.cast(x.dtype()), out});
   return out;
 }
 
 }  // namespace
 
 Tensor orthogonalised(const Tensor& x) {
-  Tensor y = Tensor::zeros(x.shape(), x.dtype(), x.device());
-  const std::vector<double> norms = norms_of(x);
-  for (int64_t i = 0; i < x.size(0); ++i) {
-    Tensor scaled = y.rows(i, i + 1);
-    if (const double norm = norms[static_cast<size_t>(i)]; norm > 0)
-      launch(MixArgs{x.rows(i, i + 1), scaled, 0, 1 / norm});
-  }
+  Tensor y = normalised(x);
   const bool wide = x.size(1) <= x.size(2);
   for (int i = 0; i < kIterations; ++i) {
     const Tensor gram = product(y, y, wide ? Transposed::second : Transposed::first);
     Tensor polynomial = product(gram, gram);
-    launch(MixArgs{gram, polynomial, kC, kB});
-    launch(MixArgs{wide ? product(polynomial, y) : product(y, polynomial), y, kA, 1});
+    mix(gram, polynomial, kC, kB);
+    mix(wide ? product(polynomial, y) : product(y, polynomial), y, kA, 1);
   }
   return y;
 }
@@ -81,25 +86,25 @@ void Muon::step(const Gradients& gradients, double rate, double scale) {
       if (gradients.find(s->of.parameter->id) != nullptr) moving.push_back(s);
     if (moving.empty()) continue;
     const int64_t rows = group[0]->m.size(0), columns = group[0]->m.size(1);
-    const auto row = [&](const Tensor& stack, size_t i) {
-      const auto at = static_cast<int64_t>(i);
-      return stack.rows(at, at + 1).reshape({rows, columns});
-    };
     const Tensor ahead = Tensor::zeros({std::ssize(moving), rows, columns}, group[0]->m.dtype(),
                                        group[0]->m.device());
+    std::vector<Tensor> here = matrices_of(ahead);
+    std::vector<MixArgs::Of> averages, begun, looks, moves;
     for (size_t i = 0; i < moving.size(); ++i) {
       const Tensor& g = *gradients.find(moving[i]->of.parameter->id);
-      Tensor here = row(ahead, i);
-      launch(MixArgs{g, moving[i]->m, config_.momentum, scale});
-      launch(MixArgs{moving[i]->m, here, 0, 1});
-      launch(MixArgs{g, here, config_.momentum, scale});
+      averages.push_back({g, moving[i]->m});
+      begun.push_back({moving[i]->m, here[i]});
+      looks.push_back({g, here[i]});
     }
-    const Tensor steps = orthogonalised(ahead);
+    launch_all(MixArgs{averages, config_.momentum, scale});
+    launch_all(MixArgs{begun, 0, 1});
+    launch_all(MixArgs{looks, config_.momentum, scale});
+    const std::vector<Tensor> steps = matrices_of(orthogonalised(ahead));
+    for (size_t i = 0; i < moving.size(); ++i)
+      moves.push_back({steps[i], moving[i]->of.parameter->value});
     // An orthogonal matrix has entries of 1 / sqrt(its longer side), on average.
     const double side = std::sqrt(static_cast<double>(std::max(rows, columns)));
-    for (size_t i = 0; i < moving.size(); ++i)
-      launch(
-          MixArgs{row(steps, i), moving[i]->of.parameter->value, 1, -rate * config_.step * side});
+    launch_all(MixArgs{moves, 1, -rate * config_.step * side});
   }
 }
 

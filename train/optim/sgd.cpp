@@ -15,14 +15,14 @@ void Sgd::step(const Gradients& gradients, double rate, double scale) {
     const Tensor* found = gradients.find(s.of.parameter->id);
     if (found == nullptr) continue;
     Tensor g = times(*found, scale);
-    if (config_.weight_decay > 0) launch(MixArgs{p, g, 1, config_.weight_decay});
+    if (config_.weight_decay > 0) mix(p, g, 1, config_.weight_decay);
     if (config_.momentum > 0) {
       const bool first = s.steps++ == 0;  // PyTorch's buffer begins with the first gradient
-      launch(MixArgs{g, s.m, first ? 0 : config_.momentum, 1});
-      if (config_.nesterov) launch(MixArgs{s.m, g, 1, config_.momentum});
+      mix(g, s.m, first ? 0 : config_.momentum, 1);
+      if (config_.nesterov) mix(s.m, g, 1, config_.momentum);
     }
     const bool by_sum = config_.momentum > 0 && !config_.nesterov;
-    launch(MixArgs{by_sum ? s.m : g, p, 1, -rate});
+    mix(by_sum ? s.m : g, p, 1, -rate);
   }
 }
 

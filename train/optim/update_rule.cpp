@@ -60,7 +60,7 @@ Tensor times(const Tensor& x, double factor) {
 void decay_weights(Tensor& p, double rate, double decay) {
   if (decay == 0) return;
   const Tensor before = p;  // the same numbers: each is read before it is written
-  launch(MixArgs{before, p, 1 - rate * decay, 0});
+  mix(before, p, 1 - rate * decay, 0);
 }
 
 }  // namespace restage
