@@ -4,8 +4,8 @@
     PYTHONPATH=build/release/python python3 docs/make_notebooks.py            writes the notebooks
     PYTHONPATH=build/release/python python3 docs/make_notebooks.py --check    1 if what is stored is of another kind than what comes out
 
-Needs numpy, h5py and matplotlib (Debian: python3-numpy, python3-h5py, python3-matplotlib), and no Jupyter: a stand-in takes what a cell
-shows. Of the same kind are lines that differ in numbers only, and pictures in the same places. tests/python/test_notebooks.py checks, too.
+Needs numpy, h5py, matplotlib and Pillow (Debian: python3-numpy, python3-h5py, python3-matplotlib, python3-pil), and no Jupyter: a
+stand-in takes what a cell shows. Stored pictures have 100 kB at most. Of the same kind are lines that differ in numbers only, and pictures in the same places. tests/python/test_notebooks.py checks, too.
 """
 import ast
 import base64
@@ -16,14 +16,12 @@ import json
 import os
 import pathlib
 import re
-import struct
 import sys
 import tempfile
 import types
 
 NOTEBOOKS = pathlib.Path(__file__).resolve().parent / "notebooks"
 LARGEST = 100_000  # bytes of a picture
-PICTURES = {".png": "image/png", ".jpg": "image/jpeg"}
 
 
 class Shown:
@@ -39,12 +37,9 @@ class Shown:
         self.text.seek(0)
         self.text.truncate()
 
-    def picture(self, kind, data):
-        if len(data) > LARGEST:
-            raise SystemExit("a picture has %d bytes, and %d are enough: make it smaller in the notebook" % (len(data), LARGEST))
-        size = "picture, %d by %d" % struct.unpack(">II", data[16:24]) if kind == "image/png" else "picture"
+    def picture(self, data):
         self.outputs.append({"output_type": "display_data", "metadata": {},
-                             "data": {kind: base64.b64encode(data).decode(), "text/plain": [size]}})
+                             "data": {"image/png": base64.b64encode(data).decode(), "text/plain": ["a picture"]}})
 
     def clear(self, wait=False):
         self.__init__()
@@ -54,7 +49,7 @@ class Image:
     """IPython.display.Image of a file."""
 
     def __init__(self, filename):
-        self.kind, self.data = PICTURES[pathlib.Path(filename).suffix], pathlib.Path(filename).read_bytes()
+        self.data = pathlib.Path(filename).read_bytes()
 
 
 def display_into(shown):
@@ -63,14 +58,16 @@ def display_into(shown):
         now = shown()
         now.end_text()
         if isinstance(what, Image):
-            now.picture(what.kind, what.data)
+            now.picture(what.data)
         else:  # a figure of matplotlib
             data = io.BytesIO()
             what.savefig(data, format="png", dpi=70, metadata={"Software": None})
-            now.picture("image/png", data.getvalue())
+            now.picture(data.getvalue())
     module = types.ModuleType("IPython.display")
     module.display, module.Image, module.clear_output = display, Image, lambda wait=False: shown().clear()
-    return {"IPython": types.ModuleType("IPython"), "IPython.display": module}
+    package = types.ModuleType("IPython")
+    package.get_ipython = lambda: None  # matplotlib asks
+    return {"IPython": package, "IPython.display": module}
 
 
 def run(page, name, stand_in=True):
@@ -108,7 +105,7 @@ def kinds(outputs, pictures=True):
         if one["output_type"] == "stream":
             said.append(re.sub(r"-?\d+(\.\d+)?(e[-+]?\d+)?", "#", "".join(one["text"])))
         elif pictures:
-            said.append(sorted(one["data"]))
+            said.append("picture" if any(kind.startswith("image/") for kind in one["data"]) else "")
     return said
 
 
@@ -128,10 +125,25 @@ def faults(page, name, outputs):
     return found
 
 
+def small(output):
+    """The output, with a picture that is too large as a smaller one in JPEG."""
+    data = base64.b64decode(output.get("data", {}).get("image/png", ""))
+    if len(data) <= LARGEST:
+        return output
+    import PIL.Image
+    picture = PIL.Image.open(io.BytesIO(data)).convert("RGB")
+    for share in (1, 0.75, 0.5, 0.35, 0.25):
+        out = io.BytesIO()
+        picture.resize([max(1, round(share * n)) for n in picture.size], PIL.Image.LANCZOS).save(out, "JPEG", quality=85)
+        if len(out.getvalue()) <= LARGEST:
+            break
+    return dict(output, data={"image/jpeg": base64.b64encode(out.getvalue()).decode(), "text/plain": ["a picture"]})
+
+
 def write(path, page, outputs):
     cells = [cell for cell in page["cells"] if cell["cell_type"] == "code"]
     for number, (cell, now) in enumerate(zip(cells, outputs), 1):
-        cell["outputs"], cell["execution_count"] = [dict(one) for one in now], number
+        cell["outputs"], cell["execution_count"] = [small(one) for one in now], number
     path.write_text(json.dumps(page, indent=1, ensure_ascii=False) + "\n")
 
 

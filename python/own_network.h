@@ -108,7 +108,7 @@ class OwnObject : public OwnTraining {
   std::string name_, kind_;
   Held instance_;
   std::vector<std::unique_ptr<Layer>> layers_;  // all members; path "": of the network itself
-  std::unordered_set<uint64_t> parameters_;  // identities of all
+  std::unordered_set<uint64_t> parameters_;     // identities of all
   bool has_loss_ = false, changes_ = false;
   mutable std::atomic<bool> told_nan_ = false;
 };

@@ -207,8 +207,10 @@ double OwnObject::number_of(const std::string& figure, const py::handle& value) 
 void OwnObject::require_learning(const Context& ctx,
                                  std::initializer_list<const Var*> answers) const {
   if (ctx.tape == nullptr || !ctx.training || ctx.frozen) return;
-  if (std::none_of(members_.begin(), members_.end(),
-                   [](const Member& m) { return m.parameter != nullptr; }))
+  const auto learns = [](const Member& m) { return m.parameter != nullptr; };
+  if (std::none_of(layers_.begin(), layers_.end(), [&](const auto& layer) {
+        return std::any_of(layer->members.begin(), layer->members.end(), learns);
+      }))
     return;
   if (std::none_of(answers.begin(), answers.end(), [](const Var* v) { return v->on_tape(); }))
     refuse("forward()'s result depends on no parameter; use ctx.leaf(parameter)");
