@@ -1,6 +1,8 @@
 // One GPU, one stream: kernels, copies and memory in the order of the program.
 #include "autograd/cuda/kernels.h"
 
+#include <cstring>
+#include <mutex>
 #include <string>
 
 #include "autograd/base/format.h"
@@ -53,6 +55,39 @@ Runtime& runtime() {
   return *instance;
 }
 
+/// Pinned memory through which copies to the GPU go: from there the GPU fetches them by itself,
+/// when their turn in the stream comes, while the host goes on. Several threads copy.
+class CopiesIn {
+ public:
+  /// Larger copies are weights that a training begins with: they go their own way, and may wait.
+  static constexpr size_t kMost = size_t{4} << 20;
+
+  void copy(void* to, const void* from, size_t bytes) {
+    const cudaStream_t in_order = stream();  // chooses the GPU of a new thread, too
+    const std::lock_guard lock(mutex_);
+    Slot& slot = slots_[next_++ % kSlots];
+    if (slot.data == nullptr) {
+      check(cudaHostAlloc(&slot.data, kMost, cudaHostAllocDefault), "cudaHostAlloc");
+      check(cudaEventCreateWithFlags(&slot.fetched, cudaEventDisableTiming), "cudaEventCreate");
+    }
+    check(cudaEventSynchronize(slot.fetched), "cudaEventSynchronize");  // of the copy before
+    std::memcpy(slot.data, from, bytes);
+    check(cudaMemcpyAsync(to, slot.data, bytes, cudaMemcpyHostToDevice, in_order),
+          "a copy to the GPU");
+    check(cudaEventRecord(slot.fetched, in_order), "cudaEventRecord");
+  }
+
+ private:
+  static constexpr size_t kSlots = 16;  ///< a step's examples are a few tensors
+  struct Slot {
+    void* data = nullptr;
+    cudaEvent_t fetched = nullptr;
+  };
+  Slot slots_[kSlots];
+  size_t next_ = 0;
+  std::mutex mutex_;
+};
+
 int64_t number_of(cudaMemPoolAttr what) {
   uint64_t bytes = 0;
   check(cudaMemPoolGetAttribute(runtime().pool, what, &bytes), "cudaMemPoolGetAttribute");
@@ -104,8 +139,10 @@ class CudaBackend final : public Backend {
   void fill_zero(void* data, size_t bytes) override {
     check(cudaMemsetAsync(data, 0, bytes, stream()), "cudaMemset");
   }
-  /// From memory that is not pinned the call returns when the numbers were read.
+  /// From memory that is not pinned CUDA's call returns when the numbers were read.
   void copy_in(void* to, const void* from, size_t bytes) override {
+    static auto* pinned = new CopiesIn;
+    if (bytes <= CopiesIn::kMost) return pinned->copy(to, from, bytes);
     check(cudaMemcpyAsync(to, from, bytes, cudaMemcpyHostToDevice, stream()), "a copy to the GPU");
   }
   void copy(void* to, const void* from, size_t bytes) override {

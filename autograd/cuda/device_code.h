@@ -24,8 +24,10 @@
 
 #include "autograd/cuda/runtime.h"
 #define RESTAGE_DEVICE __device__
+#define RESTAGE_UNROLL _Pragma("unroll")  // arrays stay in registers
 #else
 #define RESTAGE_DEVICE
+#define RESTAGE_UNROLL
 #endif
 
 namespace restage::cuda {
@@ -109,6 +111,7 @@ struct Group {
   RESTAGE_DEVICE S sum(int64_t n, F f) const {
     if constexpr (sizeof(S) > kRoom) {  // Sums, one after the other
       S out;
+      RESTAGE_UNROLL
       for (int k = 0; k < S::kCount; ++k) out.of[k] = sum(n, [&](int64_t i) { return f(i).of[k]; });
       return out;
     } else {
