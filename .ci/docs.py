@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 """Pages for people: every relative link and its anchor lead somewhere, every page that code names is there, every step of .ci/run
-that a page or a workflow names is one, and docs/decisions.md is short enough to be read. Prints one line for each fault; exit code 1 if
+that a page or a workflow names is one, every place that repeats the version has that of CMakeLists.txt, and docs/decisions.md is short enough to be read. Prints one line for each fault; exit code 1 if
 there is any."""
 import pathlib
 import re
@@ -68,10 +68,29 @@ def check_steps():
             faults.append("%s: names '%s', which is no step of .ci/run" % (name, step))
 
 
+def check_version():
+    """What a user or a program reads as the version (the files of cmake/ports have a test of their own)."""
+    version = re.search(r"project\(restage VERSION ([\d.]+)", (ROOT / "CMakeLists.txt").read_text())[1]
+    minor = version.rpartition(".")[0]
+    for name, pattern, wanted in (("CITATION.cff", r"^version: (.*)$", version), ("README.md", r"restage[_-](\d+\.\d+\.\d+)", version),
+                                  ("docs/install.md", r"restage[_-](\d+\.\d+\.\d+)", version),
+                                  ("CHANGELOG.md", r"^## \[(\d+\.\d+\.\d+)\] - \d{4}-\d\d-\d\d$", version),
+                                  ("docs/api.md", r"find_package\(restage ([\d.]+)", minor), ("docs/extending.md", r"find_package\(restage ([\d.]+)", minor),
+                                  ("docs/stability.md", r"find_package\(restage ([\d.]+)", minor),
+                                  ("tests/install/CMakeLists.txt", r"find_package\(restage ([\d.]+)", minor)):
+        found = re.findall(pattern, (ROOT / name).read_text(), re.M)
+        for one in found[:1] if name == "CHANGELOG.md" else found:  # a changelog begins with the newest
+            if one != wanted:
+                faults.append("%s: names %s, and CMakeLists.txt %s" % (name, one, version))
+        if not found:
+            faults.append("%s: names no version; %s is wanted" % (name, wanted))
+
+
 for page in pages():
     check_links(page)
 check_names_in_code()
 check_steps()
+check_version()
 
 
 words = len(DECISIONS.read_text().split())

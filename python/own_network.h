@@ -42,7 +42,8 @@ void be_the_program();
 /// The object of Python behind a network, and its members by name. Python keeps the objects.
 class OwnObject : public OwnTraining {
  public:
-  /// `made`: what build() of restage/_network.py gives, (instance, [(name, member)]). With the GIL.
+  /// `made`: what build() of restage/_network.py gives, (instance, [(name, member, path of its
+  /// layer, class of its layer)]). With the GIL.
   OwnObject(std::string name, std::string kind, const py::tuple& made);
 
   const py::object& instance() const { return *instance_; }
@@ -88,14 +89,25 @@ class OwnObject : public OwnTraining {
     Tensor* buffer = nullptr;
     std::shared_ptr<Module> child;
     Held keeps;
+    void visit(Fields& fields, const std::string& as);
   };
+  /// Members that follow one another and belong to one object below the network, such as a layer.
+  struct Layer final : Module {
+    std::string path, of_class;
+    bool changes = false;
+    std::vector<Member> members;
+    void visit(Fields& fields) override;
+    const char* kind() const override { return of_class.c_str(); }
+    bool changes_buffers() const override { return changes; }
+  };
+  static Member member_of(const std::string& name, const py::object& value);
   std::vector<std::string> figures() const;
   /// A figure that validate() gave. ShapeError where it is no number; tells once of one that is
   /// NaN.
   double number_of(const std::string& figure, const py::handle& value) const;
   std::string name_, kind_;
   Held instance_;
-  std::vector<Member> members_;
+  std::vector<std::unique_ptr<Layer>> layers_;  // all members; path "": of the network itself
   std::unordered_set<uint64_t> parameters_;  // identities of all
   bool has_loss_ = false, changes_ = false;
   mutable std::atomic<bool> told_nan_ = false;

@@ -72,37 +72,60 @@ Held held(py::object o) {
 
 OwnObject::OwnObject(std::string name, std::string kind, const py::tuple& made)
     : name_(std::move(name)), kind_(std::move(kind)), instance_(held(made[0])) {
-  for (const py::handle entry : made[1]) {
-    const auto pair = py::reinterpret_borrow<py::tuple>(entry);
-    Member member;
-    member.name = pair[0].cast<std::string>();
-    const py::object value = pair[1];
-    member.keeps = held(value);
-    if (py::isinstance<Parameter>(value)) {
-      member.parameter = value.cast<PyParameter>();
-      member.parameter->value = member.parameter->value.cast(DType::f32);
-      parameters_.insert(member.parameter->id);
-    } else if (py::isinstance<PyModel>(value)) {
-      member.child = value.cast<const PyModel&>().net;
-      for (const Parameter* of_child : parameters_of(*member.child))
-        parameters_.insert(of_child->id);
-    } else {
-      member.buffer = &value.cast<Tensor&>();
-    }
-    members_.push_back(std::move(member));
-  }
   has_loss_ = py::hasattr(*instance_, "loss");
   changes_ = attribute("changes_buffers", false);
+  for (const py::handle entry : made[1]) {
+    const auto said = py::reinterpret_borrow<py::tuple>(entry);
+    Member member = member_of(said[0].cast<std::string>(), said[1]);
+    if (member.parameter) parameters_.insert(member.parameter->id);
+    if (member.child)
+      for (const Parameter* of_child : parameters_of(*member.child))
+        parameters_.insert(of_child->id);
+    const auto path = said[2].cast<std::string>();
+    if (layers_.empty() || layers_.back()->path != path) {
+      layers_.push_back(std::make_unique<Layer>());
+      layers_.back()->path = path;
+      layers_.back()->of_class = said[3].cast<std::string>();
+      layers_.back()->changes = changes_;
+    }
+    layers_.back()->members.push_back(std::move(member));
+  }
+}
+
+OwnObject::Member OwnObject::member_of(const std::string& name, const py::object& value) {
+  Member member;
+  member.name = name;
+  member.keeps = held(value);
+  if (py::isinstance<Parameter>(value)) {
+    member.parameter = value.cast<PyParameter>();
+    member.parameter->value = member.parameter->value.cast(DType::f32);
+  } else if (py::isinstance<PyModel>(value)) {
+    member.child = value.cast<const PyModel&>().net;
+  } else {
+    member.buffer = &value.cast<Tensor&>();
+  }
+  return member;
+}
+
+void OwnObject::Member::visit(Fields& fields, const std::string& as) {
+  if (parameter)
+    fields(as, *parameter);
+  else if (child)
+    fields(as, *child);
+  else
+    fields(as, *buffer);
+}
+
+void OwnObject::Layer::visit(Fields& fields) {
+  for (Member& member : members) member.visit(fields, member.name.substr(path.size() + 1));
 }
 
 void OwnObject::visit_members(Fields& fields) {
-  for (Member& member : members_) {
-    if (member.parameter)
-      fields(member.name, *member.parameter);
-    else if (member.child)
-      fields(member.name, *member.child);
+  for (const auto& layer : layers_) {
+    if (!layer->path.empty())
+      fields(layer->path, *layer);
     else
-      fields(member.name, *member.buffer);
+      for (Member& member : layer->members) member.visit(fields, member.name);
   }
 }
 
@@ -194,11 +217,15 @@ void OwnObject::require_learning(const Context& ctx,
 void OwnObject::require_same_members() const {
   static const char* const kModule = "restage._network";
   const py::list now = py::module_::import(kModule).attr("members")(*instance_);
-  bool same = py::len(now) == members_.size();
-  for (size_t i = 0; same && i < members_.size(); ++i) {
-    const py::object member = py::reinterpret_borrow<py::tuple>(now[i])[1];
-    same = member.is(*members_[i].keeps);
-  }
+  size_t i = 0;
+  bool same = true;
+  for (const auto& layer : layers_)
+    for (const Member& member : layer->members) {
+      same = same && i < now.size() &&
+             py::object(py::reinterpret_borrow<py::tuple>(now[i])[1]).is(*member.keeps);
+      ++i;
+    }
+  same = same && i == now.size();
   if (!same)
     refuse("a Parameter or Tensor of __init__ was replaced; change it with assign() instead");
 }

@@ -194,6 +194,23 @@ HWY_INLINE void sum(int64_t k, const T* a, const T* b, Sums<T, Rows>& acc) {
   }
 }
 
+/// The same of rows as they lie in memory, `row` numbers from one to the next: the same bits.
+template <class T, int Rows>
+HWY_INLINE void sum_rows(int64_t k, const T* a, int64_t row, const T* b, Sums<T, Rows>& acc) {
+  using V = typename Simd<T>::Vector;
+  for (int64_t l = 0; l < k; ++l) {
+    alignas(kVectorBytes) V bv[kVectors];
+#pragma GCC unroll 2
+    for (int v = 0; v < kVectors; ++v) bv[v] = *reinterpret_cast<const V*>(b + v * Simd<T>::width);
+#pragma GCC unroll 12
+    for (int i = 0; i < Rows; ++i) {
+#pragma GCC unroll 2
+      for (int v = 0; v < kVectors; ++v) acc[i][v] += a[i * row + l] * bv[v];
+    }
+    b += Simd<T>::cols;
+  }
+}
+
 /// out [Rows, cols] = a (packed, Stride rows wide) times b (packed), plus out if Add.
 template <class T, int Rows = kRows, int Stride = Rows, bool Add = false>
 inline void multiply(int64_t k, const T* a, const T* b, T* out) {

@@ -26,7 +26,8 @@ namespace {
 
 constexpr int64_t kTileRows = 288;  // times kDepth: half of a small L2
 constexpr int64_t kTileCols = 512;
-constexpr int64_t kShared = 1 << 19;   // numbers of both operands packed at a time
+constexpr int64_t kShared = 1 << 19;        // numbers of both operands packed at a time
+constexpr int64_t kPage = 4096, kWays = 6;  // of a small L1
 constexpr int64_t kSharedRows = 1024;  // if a has more rows than this, each tile packs its own rows
 constexpr int64_t kPieces = 16;        // tiles wanted at least, to have some to share
 constexpr int64_t kSmallest = 1 << 15;  // cycles, roughly, that a piece should take
@@ -44,6 +45,11 @@ struct Product {
   /// Whether this is a product of a few rows with weights [n, k] as they lie in memory, of which
   /// each number is needed once.
   bool thin() const { return m <= kThin && a.col == 1 && b.row == 1 && !accumulate; }
+  /// Whether rows of a are read as they lie in memory. Packed are columns, and rows that would
+  /// push each other out of the first cache: a multiple of a page from one to the next.
+  bool rows_lie_well() const {
+    return a.col == 1 && (kRows <= kWays || a.row * static_cast<int64_t>(sizeof(T)) % kPage != 0);
+  }
 };
 
 /// Where a register tile stands: its block of k is the first, the last, or neither.
@@ -75,16 +81,22 @@ void finish_tile(const Product<T>& p, const Place& at, int64_t rows, const T* su
   }
 }
 
-/// One register tile: sums over a block of k, then out.
+/// One register tile: sums over a block of k, then out. `row`: a is not packed, and its rows are so
+/// many numbers apart; 0: packed.
 template <class T, int Rows>
-void register_tile(const Product<T>& p, const Place& at, int64_t k, const T* a, const T* b) {
+void register_tile(const Product<T>& p, const Place& at, int64_t k, const T* a, int64_t row,
+                   const T* b) {
   using V = typename Simd<T>::Vector;
   constexpr int width = Simd<T>::width, cols = Simd<T>::cols;
   T* c = p.out + at.row * p.n + at.col;
   const T* bias = p.bias ? p.bias + at.col : nullptr;
   alignas(kVectorBytes) Sums<T, Rows> acc = {};
   for (int i = 0; i < Rows; ++i) hwy::Prefetch(c + i * p.n);
-  sum<T, Rows, kRows>(k, a, b, acc);
+  if (row == 0) {
+    sum<T, Rows, kRows>(k, a, b, acc);
+  } else {
+    sum_rows<T, Rows>(k, a, row, b, acc);
+  }
   if (p.n - at.col >= cols) {
     const bool read = !at.first || p.accumulate;
 #pragma GCC unroll 12
@@ -140,7 +152,8 @@ struct Cut {
   template <class T>
   static Cut of(const Product<T>& p, int64_t batch) {
     constexpr int64_t step = Simd<T>::cols;
-    Cut c{batch == 1 && p.m <= kSharedRows && !p.thin(), batch == 1 && p.m > kTileRows, p.k, 0, 0};
+    Cut c{batch == 1 && p.m <= kSharedRows && !p.thin() && !p.rows_lie_well(),
+          batch == 1 && p.m > kTileRows, p.k, 0, 0};
     const int64_t wide = (c.share_a ? p.m : 0) + (c.share_b ? p.n : 0);
     if (wide * p.k > kShared) c.depth = std::max(kDepth, kShared / wide / kDepth * kDepth);
     // A multiply-add of a register tile takes 1/32 cycle, fetching and packing a number of b one.
@@ -184,18 +197,21 @@ void tile(const Product<T>& p, const Packed<T>& packed, int64_t i0, int64_t i1, 
   alignas(64) T own_b[kDepth * cols];
   thin_tiles(p, j0, thin_end);
   if (thin_end == j1) return;
-  const Buffer<T> own_a(packed.a ? 0 : round_up(i1 - i0, kRows) * std::min(kDepth, p.k));
+  const int64_t row = !packed.a && p.rows_lie_well() ? p.a.row : 0;
+  const Buffer<T> own_a(packed.a || row > 0 ? 0 : round_up(i1 - i0, kRows) * std::min(kDepth, p.k));
   for (int64_t l0 = packed.begin; l0 < packed.end; l0 += kDepth) {
     const int64_t l = std::min(kDepth, packed.end - l0), before = l0 - packed.begin;
     const auto at = [&](int64_t i, int64_t j) { return Place{i, j, l0 == 0, l0 + l == p.k}; };
-    const T* a = packed.a ? packed.a + before * m + i0 * l : own_a.data();
-    if (!packed.a) pack_rows(p.a.from(i0, l0), i1 - i0, l, own_a.data());
+    const T* a = packed.a  ? packed.a + before * m + i0 * l
+                 : row > 0 ? &p.a.at(i0, l0)
+                           : own_a.data();
+    if (!packed.a && row == 0) pack_rows(p.a.from(i0, l0), i1 - i0, l, own_a.data());
     for (int64_t j = thin_end; j < j1; j += cols) {
       const T* b = packed.b ? packed.b + before * n + j * l : own_b;
       if (!packed.b) pack_b(p.b.from(l0, j), l, std::min<int64_t>(cols, j1 - j), own_b);
       for (int64_t i = i0; i < i1; i += kRows) {
         const int64_t rows = std::min<int64_t>(kRows, i1 - i);
-        kernels[rows - 1](p, at(i, j), l, a + (i - i0) * l, b);
+        kernels[rows - 1](p, at(i, j), l, a + (i - i0) * (row > 0 ? row : l), row, b);
       }
     }
   }

@@ -6,7 +6,9 @@
 // gradient, of g = dL/dy and of the two numbers.
 //
 // Formulas are written in the operators + - * /, comparisons, where(condition, a, b), the numbers
-// zero and one, and the functions of binary_values.h. NaN stays NaN.
+// zero and one, and the functions of binary_values.h. NaN stays NaN. Where products stand inside of
+// where(), GCC takes a branch for each number and no vectors: prelu chooses first and multiplies
+// then.
 #pragma once
 
 // clang-format off
@@ -26,8 +28,10 @@
   row(pow, a, b, "a^b; derivative 0 by b where a is 0 or less", positive, power(a, b),             \
       of_both, g * b * power(a, b - one),                                                          \
       of_both, where(a <= zero, zero, g * power(a, b) * logarithm(a)))                             \
-  row(prelu, x, slope, "x, or slope x where x is 0 or less", no_zero, where(x > zero, x, slope * x),       \
-      of_both, where(x > zero, g, slope * g), of_both, where(x > zero, zero, g * x))               \
+  row(prelu, x, slope, "x, or slope x where x is 0 or less", no_zero,                              \
+      where(x > zero, x, zero) + slope * where(x > zero, zero, x),                                 \
+      of_both, where(x > zero, g, zero) + slope * where(x > zero, zero, g),                        \
+      of_both, g * where(x > zero, zero, x))                                                       \
   row(atan2, y, x,                                                                                 \
       "angle of the direction (x, y), radians in (-pi, pi]; derivatives 0 within 1e-6 of (0, 0)",  \
       all, angle(y, x), of_both, by_radius(g, y, x, x), of_both, -by_radius(g, y, x, y))

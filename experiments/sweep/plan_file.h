@@ -27,7 +27,7 @@ struct TrialEntry {
 /// What the folder must know of a search.
 struct SearchRule {
   std::string kind, metric;
-  int trials = 0;  ///< that `sweep run` asks for, if the kind asks
+  int trials = 0;  ///< that `sweep run` asks for, if the kind asks; not more than there are points
   bool asks() const { return kind == "tpe"; }
 };
 

@@ -105,7 +105,10 @@ std::string resolved(const SweepFile& file, const std::string& dir) {
 
 std::optional<SearchRule> search_rule(const SweepFile& file) {
   if (!file.search) return std::nullopt;
-  return SearchRule{file.search->kind, file.search->metric, file.search->trials};
+  const Search& search = *file.search;
+  const double points = search::size_of(search.space);  // few, or a space without an end
+  const int trials = points < search.trials ? static_cast<int>(points) : search.trials;
+  return SearchRule{search.kind, search.metric, trials};
 }
 
 using Files = std::vector<std::pair<std::string, std::string>>;  // path, content

@@ -19,9 +19,9 @@ except ImportError as _error:
                           f"(-DPython3_EXECUTABLE={_sys.executable})") from _error
     raise
 from . import benchmark, data, layers, metrics, ops, torch
+from ._arguments import convert_joints, gradcheck, load_model, load_safetensors, save_safetensors, set_threads
 from ._core import (Adam, AdamW, Average, Context, Frame, Gradients, Init, InputError, Lion, Model, Muon, NonFiniteError, Op,
-                    Parameter, Report, SGD, Schedule, ShapeError, Tape, Tensor, Var, WorkError, convert_joints, gradcheck,
-                    load_model, load_safetensors, models, save_safetensors, set_threads, threads)
+                    Parameter, Report, SGD, Schedule, ShapeError, Tape, Tensor, Var, WorkError, models, threads)
 from ._files import (Clip, ClosedForm, Mesh, closed_form, load_cloud, load_clouds, load_mesh, load_motion,
                      sweep_results)
 from ._grad import no_grad

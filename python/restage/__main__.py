@@ -6,6 +6,11 @@ import sys
 
 from . import _core, _network
 
+# Commands that read networks, by their weights or by their names.
+NETWORKS = ("train", "sweep plan", "sweep run", "sweep ask", "sweep export", "trial", "replay", "retarget", "track", "stream", "skeleton",
+            "adapt", "assess", "eval", "info", "weights import", "weights export")
+HELP = "  --python FILE.py  (python3 -m restage) import a file of networks first; may be given several times"
+
 
 def _files_of(words):
     """The words without --python, and the files that it names."""
@@ -24,6 +29,13 @@ def _files_of(words):
     return rest, files
 
 
+def _asks_for_help(words):
+    """Whether the page that is printed is that of the program or of a command that reads networks."""
+    asked = [word for word in words if word in ("-h", "--help")]
+    names = [word for word in words if not word.startswith("-")]
+    return words == [] or (asked and (not names or names[0] in NETWORKS or " ".join(names[:2]) in NETWORKS))
+
+
 def main():
     _core.be_the_program()
     try:
@@ -35,8 +47,8 @@ def main():
         return 2
     _network.start_with_python()
     code = _core.main(words)
-    if words in ([], ["-h"], ["--help"]):
-        print("  --python FILE.py  (python3 -m restage) import a file of networks first; may be given several times", flush=True)
+    if code == 0 and _asks_for_help(words):
+        print("\nNetworks of Python:\n" + HELP, flush=True)
     return code
 
 

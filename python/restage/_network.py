@@ -43,12 +43,13 @@ def _no_layer(value):
     return inspect.isroutine(value) or inspect.ismodule(value)
 
 
-def _walk(value, path, seen, found):
-    """Adds (path, object) for all that is below a value: members, and layers that hold members."""
+def _walk(value, path, seen, found, layer=("", "")):
+    """Adds (path, object, layer) for all that is below a value: members, and layers that hold members. layer: path and class of the
+    layer that holds it."""
     if isinstance(value, (_core.Parameter, _core.Tensor, _core.Model)):
         if id(value) not in seen:
             seen.add(id(value))
-            found.append((path, value))
+            found.append((path, value, layer))
         return
     if isinstance(value, (list, tuple)):
         below = [(str(k), item) for k, item in enumerate(value)]
@@ -56,26 +57,27 @@ def _walk(value, path, seen, found):
         below = [(str(key), item) for key, item in value.items()]
     elif _is_layer(value) and id(value) not in seen:
         seen.add(id(value))
-        found.append((path, value))
-        below = _parts(value)
+        found.append((path, value, layer))
+        below, layer = _parts(value), (path, type(value).__name__)
     else:
         return
     for name, item in below:
-        _walk(item, f"{path}.{name}" if path else name, seen, found)
+        _walk(item, f"{path}.{name}" if path else name, seen, found, layer)
 
 
 def members(owner):
-    """[(name, Parameter, Tensor or Model)] of a network, by the names of attributes; a shared one has its first name."""
+    """[(name, Parameter, Tensor or Model, path of its layer, class of its layer)] of a network, by the names of attributes; a shared one
+    has its first name."""
     found = []
     _walk(owner, "", set(), found)
-    return [(name, value) for name, value in found if isinstance(value, (_core.Parameter, _core.Tensor, _core.Model))]
+    return [(name, value, *layer) for name, value, layer in found if isinstance(value, (_core.Parameter, _core.Tensor, _core.Model))]
 
 
 def _begin(owner, init):
     """Layers draw their first numbers from the keys of their places."""
     found = []
     _walk(owner, "", set(), found)
-    for path, value in found:
+    for path, value, _ in found:
         begin = getattr(value, "begin", None)
         if begin is None or isinstance(value, _core.Model):
             continue

@@ -1,8 +1,8 @@
 #!/usr/bin/python3
-"""Compares `restage eval` with the oracle's metrics.py (numpy, scipy, h5py) on random and degenerate input.
+"""Compares `restage eval` with the oracle's tests/oracle/reference/metrics.py (numpy, scipy, h5py) on random and degenerate input.
 
-    python3 tests/nn/metrics_oracle.py RESTAGE ORACLE_DIR [--cases N] [--seed S]
-    python3 tests/nn/metrics_oracle.py --golden ORACLE_DIR      writes metrics_golden.json beside this file
+    python3 tests/nn/metrics_oracle.py RESTAGE [--cases N] [--seed S]
+    python3 tests/nn/metrics_oracle.py --golden      writes metrics_golden.json beside this file
 
 Exit status 1 if a value differs by more than 1e-9 or one side has a value where the other has none."""
 import json
@@ -15,6 +15,7 @@ import warnings
 import numpy as np
 
 HERE = os.path.dirname(os.path.abspath(__file__))
+REFERENCE = os.path.join(HERE, "..", "oracle", "reference")
 warnings.filterwarnings("ignore")
 
 
@@ -72,9 +73,9 @@ def cases(seed, count):
     yield "no true vertices", N(4, 22, 3), N(4, 22, 3), N(4, 40, 3), None
 
 
-def oracle(folder, pj, gj, pv, gv):
+def oracle(pj, gj, pv, gv):
     """Every metric; None where the oracle gives no finite number or fails."""
-    sys.path.insert(0, folder)
+    sys.path.insert(0, REFERENCE)
     sys.dont_write_bytecode = True
     import metrics as M
 
@@ -105,7 +106,7 @@ def oracle(folder, pj, gj, pv, gv):
 UNDETERMINED = {"collinear truth": ("pa_acc", "pa_acc_rigid"), "truth joints all equal": ("pa_acc_rigid",)}
 
 
-def compare(restage, folder, count, seed):
+def compare(restage, count, seed):
     import h5py
     worst, bad, total = 0.0, 0, 0
     with tempfile.TemporaryDirectory() as tmp:
@@ -122,7 +123,7 @@ def compare(restage, folder, count, seed):
                 print("%-32s exit code %d: %s" % (name, run.returncode, run.stderr.strip()))
                 bad += 1
                 continue
-            got, want = json.loads(run.stdout)["mean"], oracle(folder, pj, gj, pv, gv)
+            got, want = json.loads(run.stdout)["mean"], oracle(pj, gj, pv, gv)
             for key, w in want.items():
                 if any(name.startswith(k) and key in v for k, v in UNDETERMINED.items()):
                     continue
@@ -136,13 +137,13 @@ def compare(restage, folder, count, seed):
     return 1 if bad else 0
 
 
-def write_golden(folder):
+def write_golden():
     keep = ("random 0", "one frame", "reflection with noise", "coplanar truth", "prediction all equal 0.5", "5 vertices")
     out = []
     for name, *arrays in cases(7, 1):
         if name in keep:
             short = [None if a is None else np.round(a[:4, :22], 6) for a in arrays]
-            out.append(dict(name=name, values=oracle(folder, *short),
+            out.append(dict(name=name, values=oracle(*short),
                             **{k: a.tolist() for k, a in zip(("pred_joints", "true_joints", "pred_vertices", "true_vertices"), short)}))
     with open(os.path.join(HERE, "metrics_golden.json"), "w") as f:
         json.dump(out, f, separators=(",", ":"))
@@ -153,8 +154,8 @@ if __name__ == "__main__":
     arguments = sys.argv[1:]
     option = lambda name, default: int(arguments[arguments.index(name) + 1]) if name in arguments else default
     if arguments[:1] == ["--golden"]:
-        write_golden(arguments[1])
-    elif len(arguments) < 2:
+        write_golden()
+    elif not arguments:
         sys.exit(__doc__)
     else:
-        sys.exit(compare(arguments[0], arguments[1], option("--cases", 200), option("--seed", 0)))
+        sys.exit(compare(arguments[0], option("--cases", 200), option("--seed", 0)))

@@ -1,6 +1,6 @@
-// The full-size networks with formula-made weights (spec 11): the same outputs as PyTorch's, number
-// by number and in the specification's checksums, the same order of parameters, the counts of the
-// papers; and fifty steps of Adam in both precisions.
+// The full-size networks with weights that follow from a formula: the same outputs as PyTorch's,
+// number by number and in checksums, the same order of parameters, the counts of the papers; and
+// fifty steps of Adam in both precisions.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -94,8 +94,8 @@ void expect_same(const std::string& name, const Tensor& got, double tolerance) {
   EXPECT_LE(worst, tolerance * largest) << name;
 }
 
-/// Mean and standard deviation of an output as the specification prints them (method.md, section
-/// 11), so that the golden file is not the only witness. Those without a line there: not compared.
+/// Mean and standard deviation of an output, as PyTorch said them when this test was written: the
+/// golden file, which can be made again, is not the only witness. smrm_quat has no line here.
 void expect_checksums(const std::string& name, const Tensor& got) {
   static const std::map<std::string, std::pair<double, double>> table = {
       {"extractor", {8.760296033e-03, 8.443566307e-02}},
@@ -236,7 +236,7 @@ TEST(OracleAdam, FiftyStepsInThreeSettings) {
   }
 }
 
-/// Fifty steps of the kernel in float32, by the gradients of tests/golden/make_adam_f32.py.
+/// Fifty steps of the kernel in float32, by the gradients of tests/oracle/cases/formulas.py.
 void expect_adam_f32(const std::string& name, const AdamConfig& c, Device device) {
   const auto numbers = [&](uint32_t tag) {
     return hash_fill({7}, tag).cast(DType::f32).to(device);

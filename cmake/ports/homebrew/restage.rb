@@ -2,7 +2,7 @@ class Restage < Formula
   desc "Correspondence-free retargeting of human motion"
   homepage "ADDRESS"
   license "Apache-2.0"
-  head "ADDRESS", branch: "main" # 0.1.0
+  head "ADDRESS", branch: "main" # 0.2.0
 
   depends_on "cmake" => :build
   depends_on "ninja" => :build

@@ -56,7 +56,7 @@ int run_info(const std::string& name, const Common& common) {
   }
   std::vector<std::vector<std::string>> rows = {{"module", "kind", "output", "parameters"}};
   for (const Layer& l : layers)
-    rows.push_back({l.name, l.kind, l.output(), std::to_string(l.parameters)});
+    rows.push_back({l.name.empty() ? "itself" : l.name, l.kind, l.output(), std::to_string(l.parameters)});
   rows.push_back({"all", model->kind(), "", std::to_string(total)});
   print(name + "\n\n" + markdown_table(rows));
   return 0;

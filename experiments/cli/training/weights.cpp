@@ -28,6 +28,28 @@ Json shape_json(const Shape& shape) {
   return out;
 }
 
+/// A row for each network of the file; where it is written in Python, also what defines it. "": the
+/// file says nothing of networks.
+std::string networks_table(const TensorFile& file) {
+  const auto said = file.metadata.find("restage");
+  if (said == file.metadata.end()) return "";
+  const Json json = json_of(said->second);
+  if (!json.is_object() || !json.contains("models") || !json["models"].is_object()) return "";
+  std::vector<std::vector<std::string>> rows = {{"for", "network", "parameters", "defined in"}};
+  for (const auto& [place, entry] : json["models"].items()) {
+    const auto text = [&entry = entry](const char* key, const char* other) {
+      return entry.is_object() && entry.contains(key) && entry[key].is_string()
+                 ? entry[key].get<std::string>()
+                 : std::string(other);
+    };
+    int64_t values = 0;
+    for (const auto& [name, t] : file.tensors)
+      if (name.starts_with(place + ".")) values += t.numel();
+    rows.push_back({place, text("model", "?"), std::to_string(values), text("module", "restage")});
+  }
+  return rows.size() > 1 ? markdown_table(rows) + "\n" : "";
+}
+
 /// `given`: a safetensors file, a run, or the name of weights that come with the program.
 int run_show(const std::string& given, const Common& common) {
   const std::string path = weights_path(given);
@@ -49,7 +71,7 @@ int run_show(const std::string& given, const Common& common) {
   std::string text = path + ": " + std::to_string(file.tensors.size()) + " tensors, " +
                      std::to_string(values) + " values\n";
   for (const auto& item : file.metadata) text += item.first + ": " + item.second + "\n";
-  print(text + "\n" + markdown_table(rows));
+  print(text + "\n" + networks_table(file) + markdown_table(rows));
   return 0;
 }
 

@@ -7,7 +7,7 @@ class Restage(CMakePackage):
     git = "ADDRESS"
     license("Apache-2.0")
 
-    version("main", branch="main")  # 0.1.0
+    version("main", branch="main")  # 0.2.0
 
     variant("fbx", default=True, description="FBX characters (Assimp)")
     variant("mpi", default=False, description="training by several processes")
