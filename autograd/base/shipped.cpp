@@ -26,19 +26,21 @@ std::string launcher() {
   return error ? "" : path.string();
 }
 
-/// The file that holds this function: the program, or the module that Python loaded.
+/// The file that holds this function: the program, the module that Python loaded, or the shared
+/// library.
 fs::path own_file() {
   Dl_info found{};
   const bool known = dladdr(reinterpret_cast<const void*>(&shipped), &found) != 0;
   return known && found.dli_fname != nullptr ? found.dli_fname : "";
 }
 
-/// The program beside the module that Python loaded: installed, or in a build folder. Empty: this
-/// is no module.
+/// The program beside the module that Python loaded or the shared library: installed, or in a build
+/// folder. Empty: this is neither.
 std::string beside_module() {
   const fs::path module = own_file();
-  if (module.extension() != ".so") return "";
-  for (const char* place : {"../../../../bin/restage", "../../restage"}) {
+  if (module.filename().string().find(".so") == std::string::npos) return "";
+  for (const char* place :
+       {"../../../../bin/restage", "../../restage", "../../bin/restage", "restage"}) {
     std::error_code error;
     const fs::path program = fs::canonical(module.parent_path() / place, error);
     if (!error) return program.string();
@@ -82,9 +84,10 @@ std::string shipped(const std::string& name) {
   if (name.empty() || fs::path(name).is_absolute() || name.find("..") != std::string::npos)
     return "";
   const fs::path program = fs::path(own_program()).parent_path(), module = own_file().parent_path();
-  // Installed; in a build folder of the clone; the same of the module for Python.
-  for (const fs::path& root : {program / "../share/restage", program / "../..",
-                               module / "../../../../share/restage", module / "../../../.."}) {
+  // Installed; in a build folder of the clone; the same of the module for Python; the shared library.
+  for (const fs::path& root :
+       {program / "../share/restage", program / "../..", module / "../../../../share/restage",
+        module / "../../../..", module / "../../share/restage"}) {
     std::error_code error;
     if (root.is_relative() || !fs::exists(root / "experiments/weights", error)) continue;
     const fs::path place = fs::weakly_canonical(root / name, error);

@@ -1,4 +1,5 @@
-"""The files for other package managers (cmake/ports): each can be read, and names this version and every library of CMakeLists.txt.
+"""The files for package managers (cmake/ports, cmake/package/debian): each can be read, and names this version and every library of
+CMakeLists.txt.
 
 None of them is run. A reader that is missing here (ruby, PyYAML) leaves out that check.
 """
@@ -16,17 +17,29 @@ PORTS = ROOT / "cmake/ports"
 CMAKE = (ROOT / "CMakeLists.txt").read_text()
 VERSION = re.search(r"project\(restage VERSION ([\d.]+)", CMAKE)[1]
 FILES = {"vcpkg": "vcpkg/restage/vcpkg.json", "spack": "spack/restage/package.py", "conda": "conda/recipe.yaml",
-         "homebrew": "homebrew/restage.rb"}
+         "homebrew": "homebrew/restage.rb", "debian": "../package/debian/control"}
 # A library as CMake finds it, and its name in each package manager, in the order of FILES.
 NAMES = {
-    "Eigen3": ("eigen3", "eigen", "eigen", "eigen"), "TBB": ("tbb", "intel-oneapi-tbb", "tbb-devel", "tbb"),
-    "HDF5": ("hdf5",) * 4, "yaml-cpp": ("yaml-cpp",) * 4, "spdlog": ("spdlog",) * 4,
-    "nlohmann_json": ("nlohmann-json", "nlohmann-json", "nlohmann_json", "nlohmann-json"), "CLI11": ("cli11",) * 4,
-    "LibLZMA": ("liblzma", "xz", "liblzma-devel", "xz"), "ZLIB": ("zlib", "zlib-api", "zlib", "zlib"), "libzip": ("libzip",) * 4,
-    "liblo": ("liblo",) * 4, "libwebsockets": ("libwebsockets",) * 4, "libwebpmux": ("libwebp", "libwebp", "libwebp", "webp"),
-    "libwebp": ("libwebp", "libwebp", "libwebp", "webp"), "GIF": ("giflib",) * 4, "TinyGLTF": ("tinygltf",) * 4,
-    "OpenSSL": ("openssl", "openssl", "openssl", "openssl@3"), "CURL": ("curl", "curl", "libcurl", "curl"),
-    "hwy": ("highway", "highway", "libhwy", "highway"), "assimp": ("assimp",) * 4,
+    "Eigen3": ("eigen3", "eigen", "eigen", "eigen", "libeigen3-dev"),
+    "TBB": ("tbb", "intel-oneapi-tbb", "tbb-devel", "tbb", "libtbb-dev"),
+    "HDF5": ("hdf5", "hdf5", "hdf5", "hdf5", "libhdf5-dev"),
+    "yaml-cpp": ("yaml-cpp", "yaml-cpp", "yaml-cpp", "yaml-cpp", "libyaml-cpp-dev"),
+    "spdlog": ("spdlog", "spdlog", "spdlog", "spdlog", "libspdlog-dev"),
+    "nlohmann_json": ("nlohmann-json", "nlohmann-json", "nlohmann_json", "nlohmann-json", "nlohmann-json3-dev"),
+    "CLI11": ("cli11", "cli11", "cli11", "cli11", "libcli11-dev"),
+    "LibLZMA": ("liblzma", "xz", "liblzma-devel", "xz", "liblzma-dev"),
+    "ZLIB": ("zlib", "zlib-api", "zlib", "zlib", "zlib1g-dev"),
+    "libzip": ("libzip", "libzip", "libzip", "libzip", "libzip-dev"),
+    "liblo": ("liblo", "liblo", "liblo", "liblo", "liblo-dev"),
+    "libwebsockets": ("libwebsockets", "libwebsockets", "libwebsockets", "libwebsockets", "libwebsockets-dev"),
+    "libwebpmux": ("libwebp", "libwebp", "libwebp", "webp", "libwebp-dev"),
+    "libwebp": ("libwebp", "libwebp", "libwebp", "webp", "libwebp-dev"),
+    "GIF": ("giflib", "giflib", "giflib", "giflib", "libgif-dev"),
+    "TinyGLTF": ("tinygltf", "tinygltf", "tinygltf", "tinygltf", "libtinygltf-dev"),
+    "OpenSSL": ("openssl", "openssl", "openssl", "openssl@3", "libssl-dev"),
+    "CURL": ("curl", "curl", "libcurl", "curl", "libcurl4-openssl-dev"),
+    "hwy": ("highway", "highway", "libhwy", "highway", "libhwy-dev"),
+    "assimp": ("assimp", "assimp", "assimp", "assimp", "libassimp-dev"),
 }
 NOT_LIBRARIES = {"PkgConfig", "Git"}
 OPTIONAL = {"MPI", "CUDAToolkit", "GTest"}  # off, or for tests
@@ -51,6 +64,7 @@ class PortsTest(unittest.TestCase):
     def test_version(self):
         for manager, file in FILES.items():
             self.assertIn(VERSION, (PORTS / file).read_text(), manager)
+        self.assertTrue((PORTS / "../package/debian/changelog").read_text().startswith(f"restage ({VERSION}-"))
 
     def test_json_and_python(self):
         self.assertEqual(json.loads((PORTS / FILES["vcpkg"]).read_text())["version"], VERSION)
