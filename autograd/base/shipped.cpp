@@ -84,7 +84,8 @@ std::string shipped(const std::string& name) {
   if (name.empty() || fs::path(name).is_absolute() || name.find("..") != std::string::npos)
     return "";
   const fs::path program = fs::path(own_program()).parent_path(), module = own_file().parent_path();
-  // Installed; in a build folder of the clone; the same of the module for Python; the shared library.
+  // Installed; in a build folder of the clone; the same of the module for Python; the shared
+  // library.
   for (const fs::path& root :
        {program / "../share/restage", program / "../..", module / "../../../../share/restage",
         module / "../../../..", module / "../../share/restage"}) {
