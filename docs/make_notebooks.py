@@ -41,8 +41,10 @@ class Shown:
         self.outputs.append({"output_type": "display_data", "metadata": {},
                              "data": {"image/png": base64.b64encode(data).decode(), "text/plain": ["a picture"]}})
 
-    def clear(self, wait=False):
-        self.__init__()
+    def clear(self):
+        self.outputs.clear()
+        self.text.seek(0)
+        self.text.truncate()
 
 
 class Image:
