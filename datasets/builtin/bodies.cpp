@@ -6,6 +6,7 @@
 #include "autograd/base/parallel.h"
 #include "datasets/builtin/body_shape.h"
 #include "datasets/builtin/body_weights.h"
+#include "datasets/builtin/shape_space.h"
 #include "datasets/builtin/surface_nets.h"
 #include "datasets/readers/errors.h"
 
@@ -27,22 +28,23 @@ std::vector<double> lines(double start, const std::vector<Stretch>& stretches) {
 }
 
 // Fine where there is detail: hands, face, feet. Symmetric in x, with a line at 0.
-GridLines grid_of(const BodyShape& s) {
+// `coarse`: a factor of all distances between lines.
+GridLines grid_of(const BodyShape& s, double coarse) {
   const double wrist = wrist_x(s), arm = map_height(s, .805), chin = map_height(s, .86);
   GridLines g;
-  const std::vector<double> half = lines(0, {{.056, .0090},
-                                             {shoulder_x(s), .0129},
-                                             {wrist - .02, .0185},
-                                             {wrist + .14 * s.hands, .0087}});
+  const std::vector<double> half = lines(0, {{.056, .0090 * coarse},
+                                             {shoulder_x(s), .0129 * coarse},
+                                             {wrist - .02, .0185 * coarse},
+                                             {wrist + .14 * s.hands, .0087 * coarse}});
   for (size_t i = half.size(); i-- > 1;) g[0].push_back(-half[i]);
   g[0].insert(g[0].end(), half.begin(), half.end());
-  g[1] = lines(-.025, {{.055, .0101},
-                       {map_height(s, .45), .0213},
-                       {arm - .045, .0168},
-                       {arm + .035, .0095},
-                       {chin, .0106},
-                       {1.02, .0087}});
-  g[2] = lines(-.19, {{.23, .0114}});
+  g[1] = lines(-.025, {{.055, .0101 * coarse},
+                       {map_height(s, .45), .0213 * coarse},
+                       {arm - .045, .0168 * coarse},
+                       {arm + .035, .0095 * coarse},
+                       {chin, .0106 * coarse},
+                       {1.02, .0087 * coarse}});
+  g[2] = lines(-.19, {{.23, .0114 * coarse}});
   return g;
 }
 
@@ -66,20 +68,29 @@ void relax(const ImplicitSurface& surface, double longest, SurfaceMesh& mesh) {
   }
 }
 
-SurfaceMesh mesh_of(const BodyShape& shape, const ImplicitSurface& surface) {
-  SurfaceMesh mesh = surface_nets([&](const Vec3& p) { return surface(p); }, grid_of(shape));
+SurfaceMesh mesh_of(const BodyShape& shape, const ImplicitSurface& surface, double coarse = 1) {
+  SurfaceMesh mesh =
+      surface_nets([&](const Vec3& p) { return surface(p); }, grid_of(shape, coarse));
   relax(surface, .01, mesh);
   return mesh;
 }
 
-/// The average body's mesh on another body: every vertex goes with the joints that carry it, and
-/// then to the surface.
-SurfaceMesh average_mesh_on(const BodyShape& shape, const ImplicitSurface& surface) {
-  static const BodyShape average;
-  static const SurfaceMesh there = mesh_of(average, shape_surface(average));
-  static const Weights weights = shape_weights(average, there);
-  SurfaceMesh mesh = there;
-  const Joints from = shape_joints(average), to = shape_joints(shape);
+/// The average body's mesh.
+struct AverageMesh {
+  explicit AverageMesh(double coarse)
+      : mesh(mesh_of(shape, shape_surface(shape), coarse)), weights(shape_weights(shape, mesh)) {}
+  BodyShape shape;
+  SurfaceMesh mesh;
+  Weights weights;
+};
+
+/// The same on another body: every vertex goes with the joints that carry it, and then to the
+/// surface.
+SurfaceMesh average_mesh_on(const AverageMesh& average, const BodyShape& shape,
+                            const ImplicitSurface& surface) {
+  SurfaceMesh mesh = average.mesh;
+  const Weights& weights = average.weights;
+  const Joints from = shape_joints(average.shape), to = shape_joints(shape);
   for (size_t v = 0; v < mesh.vertices.size(); ++v) {
     Vec3 move = Vec3::Zero();
     for (size_t j = 0; j < kJoints; ++j)
@@ -124,7 +135,11 @@ Body builtin_body(uint64_t seed, const std::string& split, int index, bool one_m
     throw InputError("builtin bodies", cat("negative body number ", index), "count from 0");
   const BodyShape shape = draw_body_shape(body_key(seed, split, index));
   const ImplicitSurface surface = shape_surface(shape);
-  Body body = body_of(shape, one_mesh ? average_mesh_on(shape, surface) : mesh_of(shape, surface));
+  const auto same_mesh = [&] {
+    static const AverageMesh average(1);
+    return average_mesh_on(average, shape, surface);
+  };
+  Body body = body_of(shape, one_mesh ? same_mesh() : mesh_of(shape, surface));
   body.id = cat("builtin_", split, "_", index);
   body.split = split;
   return body;
@@ -133,6 +148,36 @@ Body builtin_body(uint64_t seed, const std::string& split, int index, bool one_m
 Body builtin_average_body() {
   const BodyShape average;
   return body_of(average, mesh_of(average, shape_surface(average)));
+}
+
+ShapeSpace builtin_shape_space() {
+  constexpr double kCoarse = 0.7;
+  const AverageMesh average(kCoarse);
+  using Shape = BodyShape;
+  constexpr std::pair<double Shape::*, double> kSteps[] = {
+      {&Shape::height, .08},    {&Shape::sex, .3},    {&Shape::fat, .35},  {&Shape::muscle, .25},
+      {&Shape::legs, .05},      {&Shape::arms, .05},  {&Shape::hips, .07}, {&Shape::head, .05},
+      {&Shape::shoulders, .07}, {&Shape::hands, .05}, {&Shape::feet, .05}};
+  constexpr size_t kDirections = std::size(kSteps);
+  ShapeSpace out;
+  out.average = body_of(average.shape, average.mesh);
+  out.vertices.resize(kDirections);
+  out.joints.resize(kDirections);
+  parallel_for(kDirections, 1, [&](int64_t begin, int64_t end) {
+    for (int64_t k = begin; k < end; ++k) {
+      const auto stepped = [&](double sign) {
+        Shape shape;
+        shape.*kSteps[k].first += sign * kSteps[k].second;
+        return body_of(shape, average_mesh_on(average, shape, shape_surface(shape)));
+      };
+      const Body more = stepped(1), less = stepped(-1);
+      for (size_t v = 0; v < more.rest.vertices.size(); ++v)
+        out.vertices[k].push_back(0.5f * (more.rest.vertices[v] - less.rest.vertices[v]));
+      for (size_t j = 0; j < kJoints; ++j)
+        out.joints[k][j] = 0.5 * (more.joints[j] - less.joints[j]);
+    }
+  });
+  return out;
 }
 
 std::vector<Body> builtin_bodies(uint64_t seed, int train, int validation, int test,

@@ -5,7 +5,6 @@
 #include <filesystem>
 
 #include "autograd/base/atomic_file.h"
-#include "datasets/characters/gltf_document.h"
 #include "datasets/readers/errors.h"
 #include "nn/geometry/rotation_key.h"
 
@@ -72,6 +71,7 @@ void GltfClipWriter::commit() {
       for (size_t f = 0; f < frames(); ++f) track.second.push_back(turns_[f * count + i]);
     }
     document.append(clip);
+    if (bulge_) document.bulge(*bulge_, rig_->file());
   }
   document.write(out_);
 }

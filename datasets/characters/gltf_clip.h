@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "datasets/characters/gltf_document.h"
 #include "datasets/importers/rigs/gltf_own_rig.h"
 
 namespace restage {
@@ -38,6 +39,8 @@ class GltfClipWriter {
             const FingerTurns* fingers = nullptr);
   /// As GlbWriter::set_filled().
   void set_filled(std::vector<int64_t> frames) { filled_ = std::move(frames); }
+  /// For all frames, after the last push(): as GltfDocument::bulge().
+  void set_bulge(GltfDocument::Bulge bulge) { bulge_ = std::move(bulge); }
   void commit();
   size_t frames() const { return moves_.empty() ? 0 : moves_[0].second.size() / 3; }
 
@@ -50,6 +53,7 @@ class GltfClipWriter {
   std::vector<std::pair<int, std::vector<float>>> moves_;  ///< nodes; 3 numbers a frame
   std::vector<double> confidence_;
   std::vector<int64_t> filled_;
+  std::optional<GltfDocument::Bulge> bulge_;
 };
 
 }  // namespace restage

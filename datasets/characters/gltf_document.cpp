@@ -2,14 +2,10 @@
 
 #include <algorithm>
 #include <cstring>
-#include <filesystem>
-#include <map>
-#include <nlohmann/json.hpp>
 
 #include "autograd/base/atomic_file.h"
 #include "autograd/base/base64.h"
-#include "datasets/readers/errors.h"
-#include "datasets/readers/gltf/gltf_detail.h"
+#include "datasets/characters/gltf_document_detail.h"
 #include "datasets/readers/text/text.h"
 #include "nn/geometry/glb_file.h"
 
@@ -17,25 +13,12 @@ namespace restage {
 namespace {
 
 namespace fs = std::filesystem;
-using Json = nlohmann::ordered_json;
+using gltf_document::checked_kinds;
+using gltf_document::is_external;
+using gltf_document::pad;
+using Json = gltf_document::Json;
 
 constexpr const char* kData = "data:application/octet-stream;base64,";
-
-/// Runs what reads parts of the structure that read_gltf() does not look at. InputError if they are
-/// of another kind than the format says.
-template <class Work>
-auto checked_kinds(const std::string& path, const Work& work) {
-  try {
-    return work();
-  } catch (const Json::exception&) {
-  } catch (const std::out_of_range&) {
-  }
-  gltf::broken(path, "has parts that are no glTF");
-}
-
-bool is_external(const Json& item) {
-  return item.contains("uri") && !item["uri"].get_ref<const std::string&>().starts_with("data:");
-}
 
 /// What a picture's bytes are, by its name.
 std::string mime_of(const std::string& uri) {
@@ -45,51 +28,7 @@ std::string mime_of(const std::string& uri) {
   return "image/png";
 }
 
-void pad(std::string& bytes) { bytes.resize((bytes.size() + 3) / 4 * 4, '\0'); }
-
 }  // namespace
-
-struct GltfDocument::State {
-  std::string path;
-  Json json;
-  std::string binary;  ///< of a GLB: the bytes of buffer 0, without an address
-  bool has_binary = false;
-  std::string added;  ///< of a text: the bytes of the new animation
-
-  /// A list of the document, which becomes an empty one where there is none.
-  Json& list(const char* name) {
-    Json& out = json[name];
-    if (out.is_null()) out = Json::array();
-    if (!out.is_array()) gltf::broken(path, cat("has ", name, " that are no list"));
-    return out;
-  }
-
-  /// The files that the document names.
-  std::vector<std::string> externals() const {
-    return checked_kinds(path, [&] { return list_externals(); });
-  }
-  std::vector<std::string> list_externals() const {
-    std::vector<std::string> out;
-    for (const char* name : {"buffers", "images"})
-      if (json.contains(name))
-        for (const Json& item : json[name])
-          if (is_external(item)) out.push_back(item["uri"].get<std::string>());
-    std::sort(out.begin(), out.end());
-    out.erase(std::unique(out.begin(), out.end()), out.end());
-    return out;
-  }
-
-  /// Where in the new animation's buffer these bytes begin.
-  static size_t put(std::string& bytes, const void* data, size_t size) {
-    const size_t at = bytes.size();
-    bytes.append(static_cast<const char*>(data), size);
-    pad(bytes);
-    return at;
-  }
-
-  Json as_binary(std::string* bytes) const;
-  Json as_text() const;
-};
 
 GltfDocument::GltfDocument(std::string_view content, const std::string& path)
     : state_(std::make_unique<State>()) {
@@ -194,7 +133,7 @@ struct GltfDocument::Worn {
 class GltfDocument::Tailor {
  public:
   Tailor(State& state, const Worn& worn, const Gltf& file, const JointMoves* unposed,
-         const std::vector<int32_t>& vertex)
+         const std::vector<int32_t>& vertex, const Bulge* bulge)
       : s_(state),
         worn_(worn),
         file_(file),
@@ -203,6 +142,7 @@ class GltfDocument::Tailor {
         vertex_(vertex) {
     if (s_.has_binary) pad(s_.binary);
     buffer_ = s_.has_binary ? 0 : s_.list("buffers").size();
+    if (bulge != nullptr) bulger_.emplace(state, *bulge, buffer_, vertex);
     first_node_ = s_.list("nodes").size();
   }
 
@@ -213,6 +153,7 @@ class GltfDocument::Tailor {
     std::map<size_t, int> wearers;  // of a mesh
     for (const auto& [node, parts] : of_node) dress(node, parts, wearers);
     add_animation();
+    if (bulger_) bulger_->end();
     Json& extras = s_.json["asset"]["extras"];
     if (!extras.is_null() && !extras.is_object()) extras = {{"before", extras}};
     for (const auto& [key, value] : worn_.json["asset"]["extras"].items()) extras[key] = value;
@@ -317,6 +258,7 @@ class GltfDocument::Tailor {
     if (!stands_still(file_.nodes[place])) wearer = own_node(wearer);
     s_.json["nodes"][wearer]["mesh"] = mesh;
     s_.json["nodes"][wearer]["skin"] = skin;
+    if (bulger_) bulger_->add(wearer, mesh, parts);
   }
 
   /// A node at the top of the scene that shows what `number` showed.
@@ -361,12 +303,36 @@ class GltfDocument::Tailor {
   const std::vector<int32_t>& vertex_;
   size_t buffer_ = 0, first_node_ = 0;
   std::optional<size_t> plain_skin_;
+  std::optional<Bulger> bulger_;
 };
 
 void GltfDocument::wear(const std::string& glb, const Gltf& file, const JointMoves* unposed,
-                        const std::vector<int32_t>& vertex) {
-  checked_kinds(state_->path,
-                [&] { Tailor(*state_, Worn(glb, state_->path), file, unposed, vertex).sew(); });
+                        const std::vector<int32_t>& vertex, const Bulge* bulge) {
+  checked_kinds(state_->path, [&] {
+    Tailor(*state_, Worn(glb, state_->path), file, unposed, vertex, bulge).sew();
+  });
+}
+
+void GltfDocument::bulge(const Bulge& bulge, const Gltf& file) {
+  State& s = *state_;
+  checked_kinds(s.path, [&] {
+    std::map<int, std::vector<GltfPart>> of_node;
+    for (const GltfPart& part : file.parts) of_node[part.node].push_back(part);
+    const size_t buffer = s.has_binary ? 0 : s.list("buffers").size() - 1;
+    Bulger bulger(s, bulge, buffer, {});
+    std::map<size_t, int> wearers;
+    for (const auto& [node, parts] : of_node) {
+      Json& shown = s.json["nodes"].at(static_cast<size_t>(node));
+      auto mesh = shown.at("mesh").get<size_t>();
+      if (wearers[mesh]++ > 0) {  // shown twice: each bulges in its own way
+        s.json["meshes"].push_back(Json(s.json["meshes"].at(mesh)));
+        shown["mesh"] = mesh = s.json["meshes"].size() - 1;
+      }
+      bulger.add(static_cast<size_t>(node), mesh, parts);
+    }
+    bulger.end();
+    s.json["buffers"][buffer]["byteLength"] = (s.has_binary ? s.binary : s.added).size();
+  });
 }
 
 void GltfDocument::keep_nodes_only() {
@@ -398,6 +364,13 @@ void GltfDocument::check_place(const std::string& out) const {
   }
 }
 
+std::string GltfDocument::State::buffer(size_t number) const {
+  const Json& item = json["buffers"][number];
+  if (!item.contains("uri")) return number == 0 && has_binary ? binary : added;
+  if (is_external(item)) return gltf::read_neighbour(item["uri"], path);
+  return gltf::decode_data_uri(item["uri"], item["byteLength"].get<size_t>(), path);
+}
+
 /// Everything in one binary chunk; `bytes` gets it.
 Json GltfDocument::State::as_binary(std::string* bytes) const {
   Json out = json;
@@ -410,11 +383,7 @@ Json GltfDocument::State::as_binary(std::string* bytes) const {
     pad(*bytes);
     begin.push_back(b == 0 && has_binary ? 0 : bytes->size());
     if (b == 0 && has_binary) continue;
-    std::string own = added;
-    if (item.contains("uri"))
-      own = is_external(item) ? gltf::read_neighbour(item["uri"], path)
-                              : gltf::decode_data_uri(item["uri"], length, path);
-    *bytes += own.substr(0, length);
+    *bytes += buffer(b).substr(0, length);
   }
   pad(*bytes);
   const auto move = [&](Json& view) {

@@ -242,7 +242,8 @@ Look read_ply(std::string_view content, const std::string& path) {
 
 class Maker {
  public:
-  Maker(const Look& look, const std::string& path) : look_(look), path_(path) {
+  Maker(const Look& look, const std::string& path, bool small)
+      : look_(look), path_(path), small_(small) {
     std::vector<Triangle> faces;
     for (const Surface& s : look.surfaces)
       for (size_t k = 0; k + 2 < s.corners.size(); k += 3)
@@ -261,6 +262,8 @@ class Maker {
                  {"nodes", {{{"name", std::filesystem::path(path_).stem().string()}, {"mesh", 0}}}},
                  {"meshes", {{{"primitives", primitives}}}}};
     if (!materials.empty()) root["materials"] = materials;
+    if (small_)
+      root["extensionsUsed"] = root["extensionsRequired"] = Json::array({"KHR_mesh_quantization"});
     for (auto& [name, list] :
          std::map<std::string, Json*>{{"images", &images_}, {"textures", &textures_}})
       if (!list->empty()) root[name] = *list;
@@ -273,9 +276,10 @@ class Maker {
   }
 
  private:
-  size_t view(const void* data, size_t bytes, int target) {
+  size_t view(const void* data, size_t bytes, int target, int stride = 0) {
     binary_.resize((binary_.size() + 3) / 4 * 4);
     Json view = {{"buffer", 0}, {"byteOffset", binary_.size()}, {"byteLength", bytes}};
+    if (stride != 0) view["byteStride"] = stride;
     if (target != 0) view["target"] = target;
     binary_.append(static_cast<const char*>(data), bytes);
     views_.push_back(std::move(view));
@@ -325,13 +329,50 @@ class Maker {
     for (const Point& p : places) low = low.cwiseMin(p), high = high.cwiseMax(p);
     accessors_.back()["min"] = {low.x(), low.y(), low.z()};
     accessors_.back()["max"] = {high.x(), high.y(), high.z()};
-    attributes["NORMAL"] = accessor(normals, "VEC3", kFloat, kVertices);
-    if (with_uvs) attributes["TEXCOORD_0"] = accessor(uvs, "VEC2", kFloat, kVertices);
+    attributes["NORMAL"] =
+        small_ ? short_normals(normals) : accessor(normals, "VEC3", kFloat, kVertices);
+    if (with_uvs)
+      attributes["TEXCOORD_0"] = small_ ? short_uvs(uvs) : accessor(uvs, "VEC2", kFloat, kVertices);
     if (!colours.empty()) attributes["COLOR_0"] = accessor(colours, "VEC4", kFloat, kVertices);
+    const bool few = small_ && rows.size() < 65535;
     Json out = {{"attributes", attributes},
-                {"indices", accessor(indices, "SCALAR", kUnsigned, kIndices)}};
+                {"indices",
+                 few ? short_indices(indices) : accessor(indices, "SCALAR", kUnsigned, kIndices)}};
     if (surface.material >= 0) out["material"] = surface.material;
     return out;
+  }
+
+  size_t short_normals(const Points& normals) {
+    std::vector<std::array<int8_t, 4>> rows;
+    for (const Point& n : normals) {
+      std::array<int8_t, 4>& row = rows.emplace_back();
+      for (size_t k = 0; k < 3; ++k)
+        row[k] = static_cast<int8_t>(std::lround(127 * n[static_cast<int>(k)]));
+    }
+    accessors_.push_back({{"bufferView", view(rows.data(), 4 * rows.size(), 34962, 4)},
+                          {"componentType", 5120},
+                          {"normalized", true},
+                          {"count", rows.size()},
+                          {"type", "VEC3"}});
+    return accessors_.size() - 1;
+  }
+
+  size_t short_uvs(const std::vector<std::array<float, 2>>& uvs) {
+    std::vector<std::array<uint16_t, 2>> rows;
+    for (const auto& uv : uvs)
+      rows.push_back({static_cast<uint16_t>(std::lround(65535 * std::clamp(uv[0], 0.0f, 1.0f))),
+                      static_cast<uint16_t>(std::lround(65535 * std::clamp(uv[1], 0.0f, 1.0f)))});
+    accessors_.push_back({{"bufferView", view(rows.data(), 4 * rows.size(), 34962)},
+                          {"componentType", 5123},
+                          {"normalized", true},
+                          {"count", rows.size()},
+                          {"type", "VEC2"}});
+    return accessors_.size() - 1;
+  }
+
+  size_t short_indices(const std::vector<uint32_t>& indices) {
+    const std::vector<uint16_t> rows(indices.begin(), indices.end());
+    return accessor(rows, "SCALAR", 5123, 34963);
   }
 
   Json material(const Material& m) {
@@ -387,6 +428,7 @@ class Maker {
 
   const Look& look_;
   const std::string& path_;
+  const bool small_;
   Points made_normals_;
   MeshDocument out_;
   std::string binary_;
@@ -412,14 +454,14 @@ bool is_whole(const Look& look, size_t vertices) {
 
 }  // namespace
 
-std::optional<MeshDocument> mesh_document(const std::string& path, size_t vertices) {
+std::optional<MeshDocument> mesh_document(const std::string& path, size_t vertices, bool small) {
   const bool obj = text::ends_in(path, {".obj"});
   if (!obj && !text::ends_in(path, {".ply"})) return {};
   const std::string content = read_file(path);
   const std::string_view text = text::without_mark(content, path);
   const Look look = obj ? ObjReader(path).read(text) : read_ply(text, path);
   if (!has_look(look) || !is_whole(look, vertices)) return {};
-  return Maker(look, path).make();
+  return Maker(look, path, small).make();
 }
 
 }  // namespace restage

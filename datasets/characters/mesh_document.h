@@ -20,7 +20,9 @@ struct MeshDocument {
 /// their names, vertex colours. Of a PLY file: vertex colours. Pictures are PNG or JPEG, beside the
 /// file or below its folder, and go over byte by byte. Normals are made where there are none.
 /// `vertices`: how many were read from the file. Nothing: it is of another kind, has no faces, or
-/// nothing but its shape.
-std::optional<MeshDocument> mesh_document(const std::string& path, size_t vertices);
+/// nothing but its shape. `small`: normals, texture coordinates and indices are as short as
+/// KHR_mesh_quantization allows.
+std::optional<MeshDocument> mesh_document(const std::string& path, size_t vertices,
+                                          bool small = false);
 
 }  // namespace restage

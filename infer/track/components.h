@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <vector>
 
 #include "infer/writers/distances.h"
@@ -13,14 +14,19 @@ struct SurfaceComponents {
   Points mean;  ///< of all frames, metres: belongs to the mesh at rest
   /// Three numbers a vertex, from -127 to 127: metres times 127 for a weight of 1.
   std::vector<std::vector<int8_t>> deltas;
-  std::vector<float> weights;  ///< of all components in the first frame, then in the second, ...
-  DistanceSummary error;       ///< between offsets and what is stored, at rest; metres
+  /// Of all components in the first frame, then in the second, ...; whole multiples of 1 / 32767.
+  std::vector<float> weights;
+  DistanceSummary error;  ///< between offsets and what is stored, at rest; metres
 };
 
-/// Principal components of the offsets, one frame each: as few as keep 95 % of all vertices' errors
-/// below `error` metres, and no more than `most`. Each component is rounded to bytes before the
-/// next one is looked for, so the next ones mend what rounding lost. The same input gives the same
-/// bits. Memory: the offsets, which are used up.
-SurfaceComponents surface_components(std::vector<Points> offsets, double error, size_t most);
+/// Calls the function with the offsets of every frame, in order; is called several times.
+using OffsetFrames = std::function<void(const std::function<void(const Points&)>&)>;
+
+/// Principal components of the offsets: as few as keep 95 % of all vertices' errors below `error`
+/// metres, and no more than `most`, which may be 64. The same input gives the same bits. Memory:
+/// some 200 frames, however many there are, and four bytes a component and frame.
+SurfaceComponents surface_components(const OffsetFrames& frames, double error, size_t most);
+
+inline constexpr size_t kMostComponents = 64;
 
 }  // namespace restage

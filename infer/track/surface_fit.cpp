@@ -1,6 +1,7 @@
 #include "infer/track/surface_fit.h"
 
 #include <algorithm>
+#include <cstring>
 
 #include "autograd/base/error.h"
 #include "infer/track/pose_fit.h"
@@ -186,6 +187,29 @@ void SurfaceFit::learn(const std::vector<Mat3>& turns) {
     times_[i] = std::min(times_[i] + 1, kLongest);
     habit_[i] += (own_shift_[i] - habit_[i]) / times_[i];
   }
+}
+
+std::string SurfaceFit::save() const {
+  std::string out(1, begun_ ? '1' : '0');
+  const auto put = [&](const double* x, size_t count) {
+    out.append(reinterpret_cast<const char*>(x), count * sizeof(double));
+  };
+  for (const auto* all : {&own_shift_, &own_turn_, &habit_})
+    for (const Vec3& x : *all) put(x.data(), 3);
+  put(times_.data(), times_.size());
+  return out;
+}
+
+void SurfaceFit::load(const std::string& state) {
+  begun_ = state.at(0) == '1';
+  size_t at = 1;
+  const auto take = [&](double* x, size_t count) {
+    std::memcpy(x, state.data() + at, count * sizeof(double));
+    at += count * sizeof(double);
+  };
+  for (auto* all : {&own_shift_, &own_turn_, &habit_})
+    for (Vec3& x : *all) take(x.data(), 3);
+  take(times_.data(), times_.size());
 }
 
 }  // namespace restage

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <Eigen/Sparse>
+#include <string>
 #include <vector>
 
 #include "infer/track/scan.h"
@@ -32,6 +33,9 @@ class SurfaceFit {
   /// turn it from rest. `scan`: null where there is none; then the frame before is kept.
   std::vector<Vec3> fit(const std::vector<Vec3>& posed, const std::vector<Mat3>& turns,
                         const Scan* scan);
+  /// What later frames depend on, and back; of the same graph.
+  std::string save() const;
+  void load(const std::string& state);
   const SurfaceGraph& graph() const { return graph_; }
   /// Of every node, the sum of the weights of the points that showed it in the last fit.
   const std::vector<double>& seen() const { return seen_; }

@@ -2,7 +2,11 @@
 
 #include <Eigen/LU>
 #include <Eigen/SVD>
+#include <algorithm>
+#include <cmath>
+#include <cstring>
 
+#include "autograd/base/error.h"
 #include "infer/writers/glb.h"
 
 namespace restage {
@@ -45,6 +49,31 @@ Tracker::Tracker(Body body, const std::string& where, TrackOptions options)
       distance_(body_.rest) {
   options_.pose.whole = surface_.graph().area / (kScanCell * kScanCell);
   correction_.fill(Mat3::Identity());
+  if (!options_.skin) return;
+  Pose rest;
+  rest.local.fill(Mat3::Identity());
+  rest.root = body_.joints[kPelvis];
+  std::vector<double> sizes;
+  for (const Mat3& blend : options_.skin(rest).blends)
+    sizes.push_back(std::cbrt(std::abs(blend.determinant())));
+  std::nth_element(sizes.begin(), sizes.begin() + std::ssize(sizes) / 2, sizes.end());
+  if (const double metres = sizes[sizes.size() / 2]; metres > 0) stored_metre_ = 1 / metres;
+}
+
+FileSkin Tracker::skin(const Pose& pose) const {
+  if (options_.skin) return options_.skin(pose);
+  FileSkin out{skinned(body_, pose), {}};
+  const PosedSkeleton posed = forward_kinematics(body_.joints, pose);
+  out.blends.reserve(out.vertices.size());
+  for (size_t v = 0; v < out.vertices.size(); ++v) out.blends.push_back(blended(body_, posed, v));
+  return out;
+}
+
+std::vector<Vec3> Tracker::surface(const Pose& pose, const Points& offsets) const {
+  FileSkin out = skin(pose);
+  for (size_t v = 0; v < offsets.size(); ++v)
+    out.vertices[v] += stored_metre_ * (out.blends[v] * offsets[v].cast<double>());
+  return std::move(out.vertices);
 }
 
 /// Puts the trunk where it was seen: the chain keeps its own path, and scales it.
@@ -72,14 +101,13 @@ std::vector<Mat3> Tracker::node_turns(const PosedSkeleton& posed) const {
   return out;
 }
 
-void Tracker::unskin(const PosedSkeleton& posed, const std::vector<Vec3>& skin,
-                     TrackedFrame* frame) const {
-  frame->offsets.reserve(skin.size());
-  for (size_t v = 0; v < skin.size(); ++v) {
-    const Mat3 turn = blended(body_, posed, v);
-    const Vec3 moved = frame->vertices[v].cast<double>() - skin[v];
-    const Mat3 back =
-        turn.determinant() > kThinBlend ? Mat3(turn.inverse()) : nearest_turn(turn).transpose();
+void Tracker::unskin(const FileSkin& skin, TrackedFrame* frame) const {
+  frame->offsets.reserve(skin.vertices.size());
+  for (size_t v = 0; v < skin.vertices.size(); ++v) {
+    const Mat3 turn = stored_metre_ * skin.blends[v];
+    const Vec3 moved = frame->vertices[v].cast<double>() - skin.vertices[v];
+    const Mat3 back = std::abs(turn.determinant()) > kThinBlend ? Mat3(turn.inverse())
+                                                                : nearest_turn(turn).transpose();
     frame->offsets.push_back((back * moved).cast<float>());
   }
 }
@@ -100,12 +128,47 @@ TrackedFrame Tracker::operator()(const Pose& chain, const Joints* seen, const Po
           turn_of(kKeptCorrection * turn_vector(out.pose.local[j] * chain.local[j].transpose()));
   }
   const PosedSkeleton posed = forward_kinematics(body_.joints, out.pose);
-  const std::vector<Vec3> skin = skinned(body_, out.pose);
-  const std::vector<Vec3> surface = surface_.fit(skin, node_turns(posed), scan ? &*scan : nullptr);
+  const FileSkin skinned_now = skin(out.pose);
+  const std::vector<Vec3> surface =
+      options_.deform
+          ? surface_.fit(skinned_now.vertices, node_turns(posed), scan ? &*scan : nullptr)
+          : skinned_now.vertices;
   for (const Vec3& p : surface) out.vertices.push_back(p.cast<float>());
-  unskin(posed, skin, &out);
+  unskin(skinned_now, &out);
   if (scan) out.distance = middle_and_most(distance_(scan->points, surface));
   return out;
+}
+
+namespace {
+
+template <class Visit>
+void each_number(Rotations& turns, Vec3& moved, const Visit& visit) {
+  for (Mat3& turn : turns) visit(turn.data(), 9);
+  visit(moved.data(), 3);
+}
+
+}  // namespace
+
+std::string Tracker::save() const {
+  std::string out;
+  Rotations turns = correction_;
+  Vec3 moved = moved_;
+  each_number(turns, moved, [&](const double* x, size_t count) {
+    out.append(reinterpret_cast<const char*>(x), count * sizeof(double));
+  });
+  return out + surface_.save();
+}
+
+void Tracker::load(const std::string& state, const std::string& where) {
+  constexpr size_t kOwn = (9 * kJoints + 3) * sizeof(double);
+  if (state.size() != save().size())
+    throw InputError(where, "is of another take", "remove it, and begin anew");
+  size_t at = 0;
+  each_number(correction_, moved_, [&](double* x, size_t count) {
+    std::memcpy(x, state.data() + at, count * sizeof(double));
+    at += count * sizeof(double);
+  });
+  surface_.load(state.substr(kOwn));
 }
 
 }  // namespace restage

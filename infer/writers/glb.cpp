@@ -20,6 +20,58 @@ using glb::three;
 
 constexpr float kNegligible = 1e-6f;  // a joint with a smaller weight is left out
 
+/// The largest weight is what the others leave over, so that all sum to 1.
+std::vector<std::array<uint16_t, 4>> short_weights(const Influences& influences) {
+  std::vector<std::array<uint16_t, 4>> out;
+  for (const auto& weights : influences.weights) {
+    std::array<uint16_t, 4>& row = out.emplace_back();
+    int left = 65535;
+    for (size_t k = 1; k < 4; ++k) {
+      row[k] = static_cast<uint16_t>(std::lround(65535 * weights[k]));
+      left -= row[k];
+    }
+    row[0] = static_cast<uint16_t>(left);
+  }
+  return out;
+}
+
+Json small_primitive(Buffer& buffer, const Mesh& mesh, const Influences& influences) {
+  const size_t count = mesh.vertices.size();
+  Json attributes;
+  attributes["POSITION"] =
+      buffer.add(mesh.vertices.data(), count * 12, count, glb::f32, "VEC3", glb::vertices);
+  Point low = mesh.vertices[0], high = low;
+  for (const Point& p : mesh.vertices) low = low.cwiseMin(p), high = high.cwiseMax(p);
+  buffer.set_bounds(attributes["POSITION"].get<int>(), three(low), three(high));
+  if (!mesh.faces.empty()) {
+    std::vector<std::array<int8_t, 4>> rows;
+    for (const Vec3& n : vertex_normals<Vec3>(mesh.vertices, mesh.faces, Vec3::UnitY())) {
+      std::array<int8_t, 4>& row = rows.emplace_back();
+      for (int k = 0; k < 3; ++k)
+        row[static_cast<size_t>(k)] = static_cast<int8_t>(std::lround(127 * n[k]));
+    }
+    attributes["NORMAL"] = buffer.add_bytes(rows.data(), count);
+  }
+  attributes["JOINTS_0"] =
+      buffer.add(influences.joints.data(), count * 4, count, glb::u8, "VEC4", glb::vertices);
+  const auto weights = short_weights(influences);
+  attributes["WEIGHTS_0"] =
+      buffer.add(weights.data(), count * 8, count, glb::u16, "VEC4", glb::vertices);
+  buffer.set_normalized(attributes["WEIGHTS_0"].get<int>());
+  Json primitive = {
+      {"attributes", attributes}, {"material", 0}, {"mode", mesh.faces.empty() ? 0 : 4}};
+  if (mesh.faces.empty()) return primitive;
+  std::vector<uint16_t> indices;
+  for (const Triangle& f : mesh.faces)
+    for (const int32_t v : f) indices.push_back(static_cast<uint16_t>(v));
+  const size_t corners = indices.size();
+  primitive["indices"] =
+      count < 65535
+          ? buffer.add(indices.data(), 2 * corners, corners, glb::u16, "SCALAR", glb::indices)
+          : buffer.add(mesh.faces.data(), 4 * corners, corners, glb::u32, "SCALAR", glb::indices);
+  return primitive;
+}
+
 Json mesh_primitive(Buffer& buffer, const Mesh& mesh, const Influences& influences) {
   const size_t count = mesh.vertices.size();
   Json attributes;
@@ -223,15 +275,17 @@ std::string GlbWriter::bytes() const {
   if (!surface_error_.empty())
     root["asset"]["extras"]["surface_error_mm"] = millimetres(surface_error_.summary());
   Buffer buffer;
+  if (options_.small)
+    root["extensionsUsed"] = root["extensionsRequired"] = Json::array({"KHR_mesh_quantization"});
   Json nodes = glb::nodes(rest_, rig_);
   root["scene"] = 0;
   root["scenes"] = Json::array({{{"nodes", {glb::top_node(rig_), nodes.size()}}}});
   const Json bones = nodes;
   nodes.push_back({{"name", "target"}, {"mesh", 0}, {"skin", 0}});
   root["nodes"] = std::move(nodes);
-  root["meshes"] =
-      Json::array({{{"name", "target"},
-                    {"primitives", Json::array({mesh_primitive(buffer, mesh_, influences_)})}}});
+  const auto primitive = options_.small ? small_primitive : mesh_primitive;
+  root["meshes"] = Json::array(
+      {{{"name", "target"}, {"primitives", Json::array({primitive(buffer, mesh_, influences_)})}}});
   root["materials"] = Json::array({{{"name", "plain"},
                                     {"pbrMetallicRoughness",
                                      {{"baseColorFactor", {0.72, 0.56, 0.45, 1.0}},
@@ -240,7 +294,7 @@ std::string GlbWriter::bytes() const {
   root["skins"] = Json::array({skin(buffer, bones, rig_)});
   if (frames() > 0)
     root["animations"] =
-        Json::array({glb::animation(buffer, tracks_, options_.clip, options_.fps)});
+        Json::array({glb::animation(buffer, tracks_, options_.clip, options_.fps, options_.small)});
   if (!confidence_.empty()) root["animations"][0]["extras"]["confidence"] = confidence_;
   if (!filled_.empty()) root["animations"][0]["extras"]["filled"] = filled_;
   if (morphs_ && frames() > 0) {

@@ -33,6 +33,9 @@ struct GlbOptions {
   double fps = kFps;
   std::string clip = "motion";       ///< the animation's name
   std::string skeleton = "restage";  ///< one of rig_conventions()
+  /// Weights of the skin and turns of bones as whole numbers of 16 bits, normals of 8 (which needs
+  /// KHR_mesh_quantization), indices of 16 where those do.
+  bool small = false;
 };
 
 /// What moves the surface besides its skin: morph targets, and their weights in every frame.

@@ -1,6 +1,7 @@
 #include "infer/writers/glb_detail.h"
 
 #include <algorithm>
+#include <cmath>
 
 namespace restage::glb {
 namespace {
@@ -31,11 +32,16 @@ int Buffer::add(const void* data, size_t bytes, size_t count, Component componen
   return static_cast<int>(accessors_.size()) - 1;
 }
 
-int Buffer::add_bytes(const void* data, size_t count, const std::array<int, 3>& low,
-                      const std::array<int, 3>& high) {
+int Buffer::add_bytes(const void* data, size_t count) {
   const int accessor = add(data, count * 4, count, i8, "VEC3", vertices);
   views_.back()["byteStride"] = 4;
   accessors_.back()["normalized"] = true;
+  return accessor;
+}
+
+int Buffer::add_bytes(const void* data, size_t count, const std::array<int, 3>& low,
+                      const std::array<int, 3>& high) {
+  const int accessor = add_bytes(data, count);
   accessors_.back()["min"] = low;
   accessors_.back()["max"] = high;
   return accessor;
@@ -112,8 +118,16 @@ void add_morphs(Buffer& buffer, const GlbMorphs& morphs, size_t frames, size_t n
   root["meshes"][0]["extras"] = {{"targetNames", names}};
   root["extensionsUsed"] = root["extensionsRequired"] = Json::array({"KHR_mesh_quantization"});
   if (frames == 0) return;
-  const int output = buffer.add(morphs.weights.data(), morphs.weights.size() * 4,
-                                morphs.weights.size(), f32, "SCALAR", none);
+  const auto& weights = morphs.weights;
+  const bool whole =
+      std::all_of(weights.begin(), weights.end(), [](float w) { return std::abs(w) <= 1; });
+  std::vector<int16_t> steps;
+  for (const float w : weights)
+    if (whole) steps.push_back(static_cast<int16_t>(std::lround(32767 * w)));
+  const int output =
+      whole ? buffer.add(steps.data(), 2 * steps.size(), steps.size(), i16, "SCALAR", none)
+            : buffer.add(weights.data(), 4 * weights.size(), weights.size(), f32, "SCALAR", none);
+  if (whole) buffer.set_normalized(output);
   Json& animation = root["animations"][0];
   animation["channels"].push_back({{"sampler", animation["samplers"].size()},
                                    {"target", {{"node", node}, {"path", "weights"}}}});
@@ -122,7 +136,8 @@ void add_morphs(Buffer& buffer, const GlbMorphs& morphs, size_t frames, size_t n
                                    {"output", output}});
 }
 
-Json animation(Buffer& buffer, const Tracks& tracks, const std::string& name, double fps) {
+Json animation(Buffer& buffer, const Tracks& tracks, const std::string& name, double fps,
+               bool small) {
   const size_t frames = tracks.frames();
   std::vector<float> times(frames);
   for (size_t f = 0; f < times.size(); ++f)
@@ -137,9 +152,20 @@ Json animation(Buffer& buffer, const Tracks& tracks, const std::string& name, do
   channel(0, "translation",
           buffer.add(tracks.roots().data(), frames * 12, frames, f32, "VEC3", none));
   std::vector<std::array<float, 4>> track(frames);
+  std::vector<std::array<int16_t, 4>> steps(frames);
   for (size_t j = 0; j < kJoints; ++j) {
-    for (size_t f = 0; f < frames; ++f) track[f] = tracks.turns()[f * kJoints + j];
-    channel(j, "rotation", buffer.add(track.data(), frames * 16, frames, f32, "VEC4", none));
+    for (size_t f = 0; f < frames; ++f) {
+      track[f] = tracks.turns()[f * kJoints + j];
+      for (size_t k = 0; k < 4; ++k)
+        steps[f][k] = static_cast<int16_t>(std::lround(32767 * track[f][k]));
+    }
+    if (!small) {
+      channel(j, "rotation", buffer.add(track.data(), frames * 16, frames, f32, "VEC4", none));
+      continue;
+    }
+    const int output = buffer.add(steps.data(), frames * 8, frames, i16, "VEC4", none);
+    buffer.set_normalized(output);
+    channel(j, "rotation", output);
   }
   return {{"name", name}, {"channels", channels}, {"samplers", samplers}};
 }

@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <functional>
 
 #include "autograd/base/error.h"
 #include "autograd/base/rng.h"
@@ -162,6 +163,51 @@ TEST(TrackFit, AFrameWithoutACloudKeepsWhatWasFound) {
   EXPECT_GT(mean_distance(seen.vertices, chain, every_vertex), 0.015);
 }
 
+TEST(TrackFit, GoesOnFromWhatWasSaved) {
+  const auto cloud = [](int f) {
+    return scanned(clothed(), moving_pose(f), 50 + static_cast<uint64_t>(f), false);
+  };
+  const auto step = [&](Tracker& tracker, int f) {
+    const Points points = cloud(f);
+    return tracker(rough(moving_pose(f), f), nullptr, &points, "scan");
+  };
+  Tracker whole(tracked_body(), "template"), first(tracked_body(), "template");
+  Tracker second(tracked_body(), "template");
+  for (int f = 0; f < 2; ++f) step(whole, f), step(first, f);
+  second.load(first.save(), "state");
+  const TrackedFrame a = step(whole, 2), b = step(second, 2);
+  EXPECT_EQ(a.vertices, b.vertices);
+  EXPECT_EQ(a.offsets, b.offsets);
+  Tracker fresh(tracked_body(), "template");
+  EXPECT_NE(step(fresh, 2).vertices, a.vertices);
+  EXPECT_THROW(second.load("short", "state"), InputError);
+}
+
+TEST(TrackFit, OffsetsBelongToTheFileThatStoresThem) {
+  // A file in centimetres whose vertices lie on their side.
+  const Mat3 stored = turned(0.5 * M_PI, Vec3::UnitX()) * 0.01;
+  TrackOptions options;
+  const Body& body = tracked_body();
+  const Tracker plain(body, "template");
+  options.skin = [&](const Pose& pose) {
+    FileSkin out{skinned(plain.body(), pose), {}};
+    const PosedSkeleton posed = forward_kinematics(body.joints, pose);
+    for (Eigen::Index v = 0; v < body.weights.rows(); ++v) {
+      Mat3 sum = Mat3::Zero();
+      for (int j = 0; j < kJoints; ++j) sum += double{plain.body().weights(v, j)} * posed.global[j];
+      out.blends.emplace_back(sum * stored);
+    }
+    return out;
+  };
+  Tracker tracker(body, "template", options);
+  EXPECT_NEAR(tracker.stored_metre(), 100, 0.5);
+  const Points cloud = scanned(clothed(), moving_pose(2), 31, false);
+  const TrackedFrame found = tracker(rough(moving_pose(2), 2), nullptr, &cloud, "scan");
+  Points back;
+  for (const Vec3& p : tracker.surface(found.pose, found.offsets)) back.push_back(p.cast<float>());
+  EXPECT_LT(mean_distance(back, found.vertices, every_vertex), 1e-5);
+}
+
 TEST(TrackFit, SaysWhatIsWrongWithATemplate) {
   Body cloud = tracked_body();
   cloud.rest.faces.clear();
@@ -180,7 +226,10 @@ TEST(TrackComponents, KeepTheErrorThatIsAskedFor) {
     }
     offsets.push_back(frame);
   }
-  const SurfaceComponents found = surface_components(offsets, 0.0005, 16);
+  const OffsetFrames all = [&](const std::function<void(const Points&)>& visit) {
+    for (const Points& frame : offsets) visit(frame);
+  };
+  const SurfaceComponents found = surface_components(all, 0.0005, 16);
   EXPECT_LE(found.error.p95, 0.0005);
   EXPECT_GE(found.deltas.size(), 3u);
   EXPECT_LE(found.deltas.size(), 8u);
@@ -197,7 +246,8 @@ TEST(TrackComponents, KeepTheErrorThatIsAskedFor) {
       worst = std::max(worst, double{(stored - offsets[f][v]).norm()});
     }
   EXPECT_NEAR(worst, found.error.max, 1e-5);
-  EXPECT_TRUE(surface_components(offsets, 1, 16).deltas.empty());
+  EXPECT_TRUE(surface_components(all, 1, 16).deltas.empty());
+  EXPECT_EQ(surface_components(all, 0, 2).deltas.size(), 2u);
 }
 
 }  // namespace

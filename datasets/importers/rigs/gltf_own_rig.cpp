@@ -4,6 +4,7 @@
 
 #include "autograd/base/format.h"
 #include "datasets/readers/errors.h"
+#include "datasets/readers/gltf/gltf_blends.h"
 #include "datasets/readers/text/text.h"
 
 namespace restage {
@@ -158,6 +159,12 @@ void GltfOwnRig::place(const Pose& pose, const FingerTurns* fingers, Joints* joi
   if (vertices == nullptr) return;
   *vertices = gltf_mesh(file_, nodes).vertices;
   for (Point& p : *vertices) p = rig_.to_ours(p.cast<double>()).cast<float>();
+}
+
+std::vector<Mat3> GltfOwnRig::blends(const Pose& pose) const {
+  std::vector<Mat3> out = gltf_blends(file_, world(&pose));
+  for (Mat3& blend : out) blend = rig_.scale * rig_.turn * blend;
+  return out;
 }
 
 NodeTurns GltfOwnRig::turns(const Pose& pose, const FingerTurns* fingers) const {

@@ -44,6 +44,10 @@ class GltfOwnRig final : public OwnRig {
   void place(const Pose& pose, const FingerTurns* fingers, Joints* joints,
              Points* vertices) const override;
 
+  /// Of each vertex in a pose, what takes a small move of it, as the file stores vertices, to the
+  /// world, metres.
+  std::vector<Mat3> blends(const Pose& pose) const;
+
   /// `fingers` may be null.
   NodeTurns turns(const Pose& pose, const FingerTurns* fingers) const;
   const Gltf& file() const { return file_; }

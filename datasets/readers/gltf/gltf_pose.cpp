@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "datasets/readers/errors.h"
+#include "datasets/readers/gltf/gltf_blends.h"
 #include "datasets/readers/gltf/gltf_look.h"
 #include "datasets/readers/text/text.h"
 
@@ -155,6 +156,19 @@ Mesh gltf_mesh(const Gltf& file, const GltfTransforms& nodes) {
   if (file.vertices.empty())
     throw InputError(file.path, "holds no mesh", "export the character with its mesh");
   return posed_mesh(file, file.vertices, nodes);
+}
+
+std::vector<Mat3> gltf_blends(const Gltf& file, const GltfTransforms& nodes) {
+  std::vector<Mat3> bones, out;
+  for (const GltfBone& bone : file.bones)
+    bones.emplace_back((nodes[bone.node] * bone.inverse_bind).linear());
+  for (size_t v = 0; v + 1 < file.first_influence.size(); ++v) {
+    Mat3& sum = out.emplace_back(Mat3::Zero());
+    for (uint32_t i = file.first_influence[v]; i < file.first_influence[v + 1]; ++i)
+      sum +=
+          double{file.influences[i].weight} * bones[static_cast<size_t>(file.influences[i].bone)];
+  }
+  return out;
 }
 
 Mesh gltf_look_mesh(const GltfLook& look, const GltfTransforms& nodes, const GltfClip* clip,

@@ -7,11 +7,10 @@
 #include "autograd/base/format.h"
 #include "autograd/base/log.h"
 #include "datasets/characters/gltf_clip.h"
-#include "datasets/characters/gltf_document.h"
-#include "datasets/characters/mesh_document.h"
 #include "datasets/characters/mesh_template.h"
 #include "datasets/frame_writer.h"
 #include "datasets/readers/text/text.h"
+#include "experiments/cli/perform/bare_document.h"
 #include "infer/frame_rate.h"
 #include "infer/writers/bvh.h"
 #include "infer/writers/glb.h"
@@ -38,17 +37,13 @@ const SystemRig& rig_of(const Shown& shown, const std::string& out) {
   return *shown.rig;
 }
 
-Sink own_sink(const SinkOptions& options, const std::string& clip, const std::string& target,
-              const std::shared_ptr<const GltfOwnRig>& own) {
-  if (text::ends_in(options.out, {".vrm"}) && own->file().humanoid.empty())
-    throw InputError(options.out, "would be no VRM character, since the target is none",
-                     "end --out in .glb");
-  if (text::ends_in(options.out, {".vrm"}) && options.animation_only)
-    throw InputError(options.out, "would be no VRM character without its meshes",
-                     "end --out in .vrma or .glb");
+}  // namespace
+
+std::string own_clip_name(const SinkOptions& options, const std::string& clip,
+                          const std::string& target, const GltfOwnRig& own) {
   std::string name = options.clip_name.empty() ? clip : options.clip_name;
   const auto is_taken = [&](const std::string& other) {
-    const auto& all = own->file().clips;
+    const auto& all = own.file().clips;
     return !options.animation_only &&
            std::any_of(all.begin(), all.end(), [&](const GltfClip& c) { return c.name == other; });
   };
@@ -60,6 +55,20 @@ Sink own_sink(const SinkOptions& options, const std::string& clip, const std::st
     while (is_taken(name + " " + std::to_string(number))) ++number;
     name += " " + std::to_string(number);
   }
+  return name;
+}
+
+namespace {
+
+Sink own_sink(const SinkOptions& options, const std::string& clip, const std::string& target,
+              const std::shared_ptr<const GltfOwnRig>& own) {
+  if (text::ends_in(options.out, {".vrm"}) && own->file().humanoid.empty())
+    throw InputError(options.out, "would be no VRM character, since the target is none",
+                     "end --out in .glb");
+  if (text::ends_in(options.out, {".vrm"}) && options.animation_only)
+    throw InputError(options.out, "would be no VRM character without its meshes",
+                     "end --out in .vrma or .glb");
+  const std::string name = own_clip_name(options, clip, target, *own);
   const auto writer = std::make_shared<GltfClipWriter>(
       options.out, target, own,
       GltfClipWriter::Options{name, options.rate(), options.animation_only});
@@ -94,41 +103,10 @@ Sink vrma_sink(const SinkOptions& options, const Shown& shown, const std::string
                           [writer](const Frames&) { writer->commit(); }});
 }
 
-/// The document of a target without bones, which keeps everything that it holds and gets a skeleton
-/// of ours: a glTF or FBX file, or an OBJ or PLY file that has more than its shape. Not known: of
-/// another kind, or with bones that were not recognised. `vertices`: how many were read from it.
-class BareDocument {
- public:
-  BareDocument(const std::string& target, size_t vertices) {
-    if (is_gltf_name(target)) {
-      content_ = read_gltf_bytes(target);
-    } else if (std::optional<MeshDocument> made = mesh_document(target, vertices)) {
-      content_ = std::move(made->glb);
-      vertex_ = std::move(made->vertex);
-      for (const std::string& remark : made->remarks) log_warning(target + ": " + remark);
-    } else {
-      return;
-    }
-    file_ = parse_gltf(content_, target);
-    if (file_.skin_nodes.empty()) document_ = std::make_unique<GltfDocument>(content_, target);
-  }
-  bool known() const { return document_ != nullptr; }
-  void check(const std::string& out) const { document_->check_place(out); }
-  void write(const std::string& glb, const JointMoves* unposed, const std::string& out) {
-    document_->wear(glb, file_, unposed, vertex_);
-    document_->write(out);
-  }
-
- private:
-  std::string content_;
-  std::vector<int32_t> vertex_;
-  Gltf file_;
-  std::unique_ptr<GltfDocument> document_;
-};
-
 /// A GLB file for a target without bones that we know. The file gets a skeleton and a skin of ours.
 Sink glb_sink(const SinkOptions& options, const Shown& shown, const std::string& target) {
   const auto bare = std::make_shared<BareDocument>(target, shown.target.vertices.size());
+  bare->say_remarks();
   if (!text::ends_in(options.out, {".glb"}) &&
       !(bare->known() && text::ends_in(options.out, {".gltf"})))
     throw InputError(options.out, "keeps the target's own file, which has no rig that we know",

@@ -53,6 +53,11 @@ Sink make_sink(const SinkOptions& options, const Shown& shown,
 /// The same with its joints converted to SinkOptions::joints, if those are asked for.
 Sink in_joints(const SinkOptions& options, Sink sink);
 
+/// What the animation is called that a target with a rig gets, for a motion called `clip`: a name
+/// that none of the file's has.
+std::string own_clip_name(const SinkOptions& options, const std::string& clip,
+                          const std::string& target, const GltfOwnRig& own);
+
 /// What the motion of a source of clouds is called: its clip's name, else its file's.
 std::string clip_name(const SourceRecord& source);
 

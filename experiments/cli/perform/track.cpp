@@ -1,217 +1,134 @@
 // restage track: one mesh over all scans of somebody.
-#include <chrono>
-#include <deque>
+#include "experiments/cli/perform/track.h"
+
 #include <filesystem>
 
+#include "autograd/base/atomic_file.h"
 #include "autograd/base/format.h"
 #include "autograd/base/log.h"
 #include "autograd/base/output_check.h"
+#include "autograd/base/words.h"
 #include "datasets/readers/text/text.h"
 #include "experiments/cli/commands.h"
-#include "experiments/cli/perform/retarget.h"
-#include "experiments/cli/perform/retarget_gaps.h"
+#include "experiments/cli/perform/bare_document.h"
 #include "experiments/cli/perform/retarget_words.h"
 #include "experiments/cli/perform/source_options.h"
 #include "experiments/cli/perform/standard_weights.h"
-#include "experiments/slow_work.h"
-#include "experiments/source.h"
-#include "infer/track/components.h"
-#include "infer/track/tracker.h"
-#include "infer/writers/glb.h"
 
 namespace restage::cli {
+
+bool writes_glb(const TrackCommand& c) { return text::ends_in(c.how.to.out, {".glb"}); }
+
 namespace {
 
-constexpr size_t kMostTargets = 64;
-constexpr double kPoorFit = 0.025;  // metres: 95 % of the points are nearer in a frame that fits
-constexpr double kPoorRatio = 2;    // to the middle of all frames'
-
-struct TrackCommand {
-  RetargetCommand how;
-  double error = 1;  ///< mm
-};
-
-bool is_glb(const std::string& out) { return text::ends_in(out, {".glb"}); }
+bool is_auto(const TrackCommand& c) { return c.how.target == kAutoTemplate; }
 
 void check(const TrackCommand& c) {
   const std::string& out = c.how.to.out;
   const bool folder = std::filesystem::path(out).extension().empty();
-  if (!is_glb(out) && !folder && !out.ends_with(".h5"))
+  if (!writes_glb(c) && !folder && !out.ends_with(".h5"))
     throw InputError(out, "is of no kind that can be written",
                      "end it in .glb, .h5, or / for a folder of frames");
   check_sink(c.how.to);
-  if (!(c.error > 0 && c.error <= 1000))
-    throw InputError("", "--error is out of range", "give millimetres above 0, up to 1000");
-  std::vector<std::string> inputs = {c.how.source.path, c.how.target};
+  for (const auto& [given, name] : {std::pair(&c.detail, "--detail"), {&c.rate, "--rate"}})
+    if (given->has_value() && !writes_glb(c))
+      throw InputError(out, "has every vertex of every frame", cat("leave ", name, " out"));
+  if (c.detail && !(*c.detail > 0 && *c.detail <= 1000))
+    throw InputError("", "--detail is out of range", "give millimetres above 0, up to 1000");
+  if (c.rate && !(*c.rate > 0 && *c.rate <= 1e6))
+    throw InputError("", "--rate is out of range", "give kilobytes a second, above 0");
+  if (c.rate && c.detail)
+    throw InputError("", "--rate and --detail both choose the number of morph targets",
+                     "leave one out");
+  if (c.texture && !is_auto(c))
+    throw InputError(c.how.target, "has texture coordinates and materials of its own",
+                     "leave --texture out, or --template");
+  if (c.texture && !writes_glb(c))
+    throw InputError(out, "holds no picture", "end --out in .glb with --texture");
+  std::vector<std::string> inputs = {c.how.source.path};
+  if (!is_auto(c)) inputs.push_back(c.how.target);
   if (!c.how.weights.empty()) inputs.push_back(weights_path(c.how.weights));
   if (!c.how.bones.empty()) inputs.push_back(c.how.bones);
   check_output(out, inputs);
 }
 
-/// What is known of all frames.
-struct Take {
-  std::vector<Pose> poses;
-  std::vector<Points> offsets;  ///< for a GLB file only
-  std::vector<std::optional<double>> confidence;
-  std::vector<std::optional<MiddleAndMost>> distance;
-  std::vector<int64_t> filled;
-  size_t points_left_out = 0;
-
-  int64_t frames() const { return std::ssize(poses); }
-  /// The middle of all frames' distances.
-  MiddleAndMost middle() const {
-    std::vector<double> medians, p95s;
-    for (const auto& d : distance)
-      if (d) medians.push_back(d->median), p95s.push_back(d->p95);
-    return {middle_and_most(medians).median, middle_and_most(p95s).median};
-  }
-  std::vector<int64_t> poor() const {
-    const double limit = std::max(kPoorFit, kPoorRatio * middle().p95);
-    std::vector<int64_t> out;
-    for (size_t f = 0; f < distance.size(); ++f)
-      if (distance[f] && distance[f]->p95 > limit) out.push_back(static_cast<int64_t>(f));
-    return out;
-  }
-};
-
-/// All frames through the networks, which answer some frames late, and the tracker.
-class TrackRun {
- public:
-  TrackRun(const TrackCommand& c, Source& source, System& system, Tracker& tracker, Gaps& gaps,
-           const Sink* sink)
-      : source_(source),
-        system_(system),
-        tracker_(tracker),
-        gaps_(gaps),
-        sink_(sink),
-        door_(frame_of(source.record()), c.how.options.force, true) {}
-
-  Take operator()() {
-    for (auto cloud = source_.next(); cloud; cloud = source_.next()) {
-      slow_.on("frame " + std::to_string(in_ + 1) + " of " + std::to_string(source_.frames()) +
-               time_left());
-      take_.points_left_out += cloud->frame.left_out;
-      push(*cloud);
-      answer();
-      ++in_;
-    }
-    gaps_.check_any();
-    system_.finish([this](const RetargetedFrame& f) { shown_.push_back(f); });
-    answer();
-    slow_.on("");
-    return std::move(take_);
-  }
-
- private:
-  /// A cloud that the networks have not answered yet; without points: it could not be used.
-  struct Unanswered {
-    Points points;
-    Joints seen{};
-    std::string source;
-  };
-
-  /// As the frames so far took.
-  std::string time_left() const {
-    if (in_ == 0) return "";
-    const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - start_;
-    const auto done = static_cast<double>(in_), all = static_cast<double>(source_.frames());
-    return format(", about %.0f s left", spent.count() * (all - done) / done);
-  }
-
-  void push(SourceCloud& cloud) {
-    const Points& points = cloud.frame.points;
-    const std::string name = cloud.frame.source;
-    std::optional<InputError> fault = cloud.fault;
-    if (!fault) try {
-        door_.pass(points, name, [&] {
-          system_.push(points, name, [this](const RetargetedFrame& f) { shown_.push_back(f); });
-        });
-      } catch (const UnusableCloud& unusable) {
-        fault = unusable;
-      }
-    if (fault) {
-      gaps_.add(in_, *fault);
-      system_.miss();
-      waiting_.emplace_back();
-      return;
-    }
-    gaps_.end();
-    waiting_.push_back({std::move(cloud.frame.points), *system_.source_joints(), name});
-  }
-
-  void answer() {
-    for (RetargetedFrame& f : shown_) {
-      if (waiting_.empty()) throw WorkError("the system showed more frames than it was given");
-      const Unanswered& in = waiting_.front();
-      const bool seen = !in.points.empty();
-      TrackedFrame found =
-          tracker_(f.pose, seen ? &in.seen : nullptr, seen ? &in.points : nullptr, in.source);
-      if (f.filled) take_.filled.push_back(take_.frames());
-      take_.poses.push_back(found.pose);
-      take_.confidence.push_back(f.confidence);
-      take_.distance.push_back(found.distance);
-      if (sink_ == nullptr) {
-        take_.offsets.push_back(std::move(found.offsets));
-      } else {
-        f.joints = forward_kinematics(tracker_.body().joints, found.pose).joints;
-        f.pose = found.pose;
-        f.vertices = std::move(found.vertices);
-        sink_->push(f);
-      }
-      waiting_.pop_front();
-    }
-    shown_.clear();
-  }
-
-  Source& source_;
-  System& system_;
-  Tracker& tracker_;
-  Gaps& gaps_;
-  const Sink* sink_;
-  CloudDoor door_;
-  SlowWork slow_;
-  std::deque<Unanswered> waiting_;
-  std::vector<RetargetedFrame> shown_;
-  Take take_;
-  int64_t in_ = 0;
-  const std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
-};
-
-/// The rig's animation, and the surface's rest as morph targets.
-Json write_glb(const TrackCommand& c, const Body& body, const std::string& clip, Take& take) {
-  const SurfaceComponents found =
-      surface_components(std::move(take.offsets), 1e-3 * c.error, kMostTargets);
-  Mesh mesh = body.rest;
-  for (size_t v = 0; v < mesh.vertices.size(); ++v) mesh.vertices[v] += found.mean[v];
-  GlbOptions how;
-  how.clip = clip;
-  if (!c.how.to.skeleton.empty()) how.skeleton = c.how.to.skeleton;
-  GlbWriter writer(c.how.to.out, mesh, body.joints, body.weights, how);
-  GlbMorphs morphs{found.deltas, found.weights, found.error, {}};
-  const bool sure = std::all_of(take.confidence.begin(), take.confidence.end(),
-                                [](const auto& x) { return x.has_value(); });
-  for (size_t f = 0; f < take.poses.size(); ++f) {
-    writer.push(take.poses[f], sure ? take.confidence[f] : std::nullopt);
-    morphs.distance.push_back(take.distance[f] ? take.distance[f]->median : -1.0);
-  }
-  writer.set_filled(take.filled);
-  writer.set_morphs(std::move(morphs));
-  writer.commit();
-  if (found.error.p95 > 1e-3 * c.error)
-    log_warning(format("%zu morph targets keep 95 %% of the vertices' errors below %.2f mm only",
-                       kMostTargets, 1e3 * found.error.p95));
-  const auto bytes = static_cast<double>(std::filesystem::file_size(c.how.to.out));
-  return {{"morph_targets", found.deltas.size()},
-          {"surface_error_mm",
-           {{"mean", 1e3 * found.error.mean},
-            {"p95", 1e3 * found.error.p95},
-            {"max", 1e3 * found.error.max}}},
-          {"bytes", bytes},
-          {"kilobytes_per_second", 1e-3 * bytes * kFps / static_cast<double>(take.frames())}};
+/// All on which the tracked frames depend.
+Json work_of(const TrackCommand& c, const Common& common, const Source& source) {
+  const SourceRecord& how = source.record();
+  const std::string weights =
+      weights_path(c.how.weights.empty() ? standard_weights() : c.how.weights);
+  return {{"source", how.path},
+          {"stamp", stamp_of(how.path)},
+          {"clip", how.clip},
+          {"sequence", how.sequence.value_or(-1)},
+          {"fps", source.fps()},
+          {"scale", how.scale},
+          {"up", how.up},
+          {"template", is_auto(c) ? c.how.target : stamp_of(c.how.target)},
+          {"bones", c.how.bones.empty() ? "" : stamp_of(c.how.bones)},
+          {"weights", stamp_of(weights)},
+          {"device", c.how.device},
+          {"seed", common.seed},
+          {"force", c.how.options.force},
+          {"surface", c.surface},
+          {"offsets", writes_glb(c)}};
 }
 
-Json document_of(const TrackCommand& c, const Common& common, const Take& take, const Gaps& gaps,
-                 const Source& source) {
+/// The template, whoever brought it, and the networks for it.
+struct Performer {
+  std::string file;
+  TargetMesh target;
+  std::unique_ptr<System> system;
+  Body body;
+  SinkOptions to;
+};
+
+Performer own_performer(const TrackCommand& c, const Common& common, Source& source,
+                        const TrackWork& work) {
+  Performer out{auto_template_mesh(work), {}, {}, auto_template(c, common, source, work), {}};
+  out.target.mesh = out.body.rest;
+  SystemInput input = load_input(c.how, common);
+  out.to = sink_options(c.how, input, out.target);
+  input.target = out.body.rest;
+  input.rest = out.body.joints;
+  out.system = make_system(system_type(c.how.system), std::move(input));
+  return out;
+}
+
+Performer given_performer(const TrackCommand& c, const Common& common, TargetMesh target) {
+  Performer out{c.how.target, std::move(target), {}, {}, {}};
+  SystemInput input = load_input(c.how, common);
+  out.to = sink_options(c.how, input, out.target);
+  out.system = system_for(c.how, std::move(input), out.target);
+  const SystemRig& rig = *out.system->rig();
+  out.body.rest = out.system->target();
+  out.body.joints = rig.rest;
+  out.body.weights = rig.weights;
+  return out;
+}
+
+/// Frames as numbers, or as files in the template's own format.
+void write_frames(const TrackedTake& t, SinkOptions to, const Performer& who,
+                  const SourceRecord& source) {
+  to.fps = t.fps;
+  const SystemRig rig{t.tracker.body().joints, t.tracker.body().weights};
+  const Shown shown{who.system->target(), &rig, nullptr};
+  const Sink sink = make_sink(to, shown, source, t.clip, who.file, nullptr);
+  for (int64_t f = 0; f < t.journal.frames(); ++f) {
+    JournalFrame in = t.journal.read(f);
+    RetargetedFrame out;
+    out.pose = in.pose;
+    out.joints = forward_kinematics(t.tracker.body().joints, in.pose).joints;
+    out.vertices = std::move(in.points);
+    out.confidence = in.confidence;
+    out.filled = in.filled;
+    sink.push(out);
+  }
+  sink.commit(t.take.filled);
+}
+
+Json document_of(const TrackCommand& c, const Common& common, const TrackTake& take,
+                 const Gaps& gaps, const Source& source, size_t vertices) {
   Json distances = Json::array(), confidence = Json::array();
   for (const auto& d : take.distance)
     distances.push_back(d ? Json({{"median", 1e3 * d->median}, {"p95", 1e3 * d->p95}}) : Json());
@@ -220,7 +137,8 @@ Json document_of(const TrackCommand& c, const Common& common, const Take& take, 
   return {{"out", c.how.to.out},
           {"source_frames", source.frames()},
           {"frames", take.frames()},
-          {"fps", kFps},
+          {"fps", source.fps()},
+          {"vertices", vertices},
           {"seed", common.seed},
           {"distance_mm", {{"median", 1e3 * middle.median}, {"p95", 1e3 * middle.p95}}},
           {"frame_distances_mm", distances},
@@ -231,7 +149,7 @@ Json document_of(const TrackCommand& c, const Common& common, const Take& take, 
           {"points_left_out", take.points_left_out}};
 }
 
-std::string text_of(const Json& document, const Take& take) {
+std::string text_of(const Json& document, const TrackTake& take) {
   std::string out = "wrote " + document["out"].get<std::string>() + ": " +
                     counted(take.frames(), "frame") +
                     format("; its points are %.1f mm from the surface, 95 %% below %.1f mm",
@@ -244,48 +162,75 @@ std::string text_of(const Json& document, const Take& take) {
   return out + " (seed " + std::to_string(document["seed"].get<uint64_t>()) + ")\n";
 }
 
-int run_track(const TrackCommand& given, const Common& common) {
-  TrackCommand c = given;
-  // The person's own motion, in the person's own place.
-  c.how.floor = c.how.contacts = "off";
-  c.how.options.foot_lock = false;
-  c.how.options.late = true;
-  check(c);
-  SystemInput input = load_input(c.how, common);
-  Source source(c.how.source, common.max_memory);
-  if (source.frames() == 0)
-    throw InputError(c.how.source.path, "holds no frames", "give at least one cloud");
-  if (source.fps() != kFps)
-    throw InputError(c.how.source.path,
-                     format("has %g frames a second, and a surface is fitted to 30", source.fps()),
-                     "give scans of 30 frames a second, or --fps 30 if they are");
-  TargetMesh target = read_target(c.how.target, c.how.bones);
-  check_mesh(c.how, target);
-  if (!c.how.options.force) check_first_frames(source);
-  const SinkOptions to = sink_options(c.how, input, target);
-  const auto system = system_for(c.how, std::move(input), target);
-  const SystemRig& rig = *system->rig();
-  Body body;
-  body.rest = system->target();
-  body.joints = rig.rest;
-  body.weights = rig.weights;
-  Tracker tracker(std::move(body), c.how.target);
-  std::optional<Sink> sink;
-  const Shown shown{system->target(), system->rig(), nullptr};
-  if (!is_glb(to.out))
-    sink = make_sink(to, shown, source.record(), clip_name(source.record()), c.how.target, nullptr);
-  Gaps gaps(source.frames(), source.fps(), c.how.options.force);
-  Take take = TrackRun(c, source, *system, tracker, gaps, sink ? &*sink : nullptr)();
-  Json document = document_of(c, common, take, gaps, source);
-  if (sink) sink->commit(take.filled);
-  if (!sink) document.update(write_glb(c, tracker.body(), clip_name(source.record()), take));
-  say_target(target);
+void say_at_the_end(const Performer& who, const Source& source, const Gaps& gaps,
+                    const TrackTake& take) {
+  say_target(who.target);
   for (const std::string& line : source.remarks()) log_warning(line);
   for (const std::string& line : gaps.lines(take.filled)) log_warning(line);
   if (const auto poor = take.poor(); !poor.empty())
     log_warning("the surface fits badly in " + counted(std::ssize(poor), "frame") + ": " +
                 listed(poor, 8));
-  print(common.json, document, text_of(document, take));
+}
+
+Json track(const TrackCommand& c, const Common& common, Source& source,
+           std::optional<TargetMesh> target, const TrackWork& work, std::string* text) {
+  const Performer who = target ? given_performer(c, common, std::move(*target))
+                               : own_performer(c, common, source, work);
+  TrackOptions options;
+  options.deform = c.surface;
+  options.skin = file_skin(c, who.target, who.file, who.body);
+  Tracker tracker(who.body, c.how.target, options);
+  TrackJournal journal(work.folder(), who.body.rest.vertices.size());
+  if (journal.frames() > 0)
+    log_info("going on behind " + counted(journal.frames(), "frame") +
+             " of a run that was stopped");
+  Gaps gaps(source.frames(), source.fps(), c.how.options.force);
+  const TrackTake take = run_frames(c, source, *who.system, tracker, journal, gaps);
+  Json document = document_of(c, common, take, gaps, source, who.body.rest.vertices.size());
+  const TrackedTake all{
+      c, who.target, who.file, tracker, journal, take, clip_name(source.record()), source.fps()};
+  if (c.texture) document["texture"] = make_texture(source, work, tracker, journal, take);
+  if (writes_glb(c))
+    document.update(write_track_glb(all));
+  else
+    write_frames(all, who.to, who, source.record());
+  say_at_the_end(who, source, gaps, take);
+  *text = text_of(document, take);
+  return document;
+}
+
+int run_track(const TrackCommand& given, const Common& common) {
+  TrackCommand c = given;
+  // The person's own motion, in the person's own place; each cloud is a frame of the result.
+  c.how.floor = c.how.contacts = "off";
+  c.how.options.foot_lock = false;
+  c.how.options.late = true;
+  check(c);
+  Source source(c.how.source, common.max_memory);
+  if (source.frames() == 0)
+    throw InputError(c.how.source.path, "holds no frames", "give at least one cloud");
+  std::optional<TargetMesh> target;
+  if (!is_auto(c)) {
+    target = read_target(c.how.target, c.how.bones);
+    check_mesh(c.how, *target);
+    if (target->mesh.faces.empty())
+      throw InputError(c.how.target, "has no faces, and a surface is fitted by them",
+                       "give a mesh");
+    if (target->own && !c.how.to.skeleton.empty())
+      throw InputError(c.how.target, "has a rig of its own, which is kept", "leave --skeleton out");
+  }
+  if (!c.how.options.force) check_first_frames(source);
+  if (c.texture) check_colours(source);
+  const TrackWork work(c.how.to.out, work_of(c, common, source));
+  std::string text;
+  try {
+    const Json document = track(c, common, source, std::move(target), work, &text);
+    work.remove();
+    print(common.json, document, text);
+  } catch (const InputError&) {  // the same would happen again
+    work.remove();
+    throw;
+  }
   return 0;
 }
 
@@ -294,8 +239,11 @@ int run_track(const TrackCommand& given, const Common& common) {
 void add_track(Program& program) {
   auto [app, c] = program.add(
       "track", "one mesh over all scans of somebody: a rigged character with a surface that moves",
-      "restage track --source scans/ --template body.obj --out actor.glb\n"
-      "restage track scans.h5 body.ply actor.glb --error 0.5 --skeleton mixamo --json\n"
+      "restage track --source scans/ --out actor.glb\n"
+      "restage track --source scans/ --template body.obj --out actor.glb --rate 100\n"
+      "restage track --source scans/ --template body.ply --out stiff.glb --no-surface\n"
+      "restage track --source coloured/ --out actor.glb --texture\n"
+      "restage track scans.h5 actor.glb --detail 0.5 --skeleton mixamo --json\n"
       "restage track --source scans/ --template body.ply --out frames/ --format ply\n"
       "restage track --source mm/ --scale mm --source-up z --fps 30 --template body.ply --out "
       "a.h5\n"
@@ -303,17 +251,25 @@ void add_track(Program& program) {
       "restage track --source dance.glb --clip Walk --template body.ply --weights w --device cpu "
       "--out a.glb --force",
       run_track);
+  c.how.target = kAutoTemplate;
   app.add_option("--source,SOURCE", c.how.source.path,
-                 "clouds of one person, 30 a second: a folder, HDF5 file, glTF or arrays")
-      .required();
-  app.add_option("--template,TEMPLATE", c.how.target,
-                 "the same person's mesh, with faces, y up, best in T-pose facing +z")
+                 "clouds of one person: a folder, HDF5 file, glTF or arrays")
       .required();
   app.add_option("--out,OUT", c.how.to.out, "X.glb, X.h5, or a folder for PLY or OBJ frames")
       .required();
-  app.add_option("--error", c.error,
+  app.add_option("--template", c.how.target,
+                 "auto: the person's own mesh is made from the clouds; or the same person's mesh, "
+                 "with faces, y up, best in T-pose facing +z (default: auto)");
+  app.add_option("--detail", c.detail,
                  "of X.glb: as many morph targets are kept, up to 64, that 95 % of the vertices' "
                  "errors are below so many mm (default: 1)");
+  app.add_option("--rate", c.rate,
+                 "of X.glb: as many morph targets are kept that the file has so many kB a second");
+  app.add_flag(
+      "--texture", c.texture,
+      "colours of PLY and OBJ scans are collected into one picture (with --template auto)");
+  app.add_flag("!--no-surface", c.surface,
+               "the skeleton alone follows the clouds, and the mesh follows the skeleton");
   app.add_option("--skeleton", c.how.to.skeleton,
                  "names and axes of the bones of X.glb: restage, smpl, mixamo, vrm, unreal "
                  "(default: restage)");
