@@ -1,7 +1,6 @@
 // Morph targets that a document gets, and their weights.
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <limits>
 
 #include "datasets/characters/gltf_document_detail.h"
@@ -25,6 +24,12 @@ void require(Json& root, const char* list) {
   Json& names = root[list];
   if (names.is_null()) names = Json::array();
   if (std::find(names.begin(), names.end(), kQuantised) == names.end()) names.push_back(kQuantised);
+}
+
+/// Of a number of the accessor.
+size_t bytes_of(const Json& accessor) {
+  const int kind = accessor.at("componentType").get<int>();
+  return kind == kFloats ? 4 : kind == kBytes || kind == kBytes + 1 ? 1 : 2;
 }
 
 double rounded(double millimetres) { return std::round(millimetres * 1e3) / 1e3; }
@@ -149,23 +154,19 @@ void GltfDocument::Bulger::widen(const Wearer& wearer, Json& animation) {
     const Json old =
         s_.json["accessors"].at(animation["samplers"].at(number).at("output").get<size_t>());
     const Json view = s_.json["bufferViews"].at(old.at("bufferView").get<size_t>());
-    if (old.at("componentType") != kFloats)
-      throw InputError(s_.path, "has weights of morph targets as whole numbers",
-                       "export it with numbers of single precision");
-    const size_t count = old.at("count").get<size_t>();
+    const size_t count = old.at("count").get<size_t>(), size = bytes_of(old);
     const std::string all = s_.buffer(view.at("buffer").get<size_t>());
     const size_t at = view.value("byteOffset", size_t{0}) + old.value("byteOffset", size_t{0});
-    if (at + 4 * count > all.size()) gltf::broken(s_.path, "has weights behind its end");
-    std::vector<float> values(count), wide;
-    std::memcpy(values.data(), all.data() + at, 4 * count);
-    for (size_t from = 0; from + before <= count; from += before) {
-      wide.insert(wide.end(), values.begin() + static_cast<std::ptrdiff_t>(from),
-                  values.begin() + static_cast<std::ptrdiff_t>(from + before));
-      wide.resize(wide.size() + 1 + bulge_.deltas.size());
-    }
-    animation["samplers"][number]["output"] =
-        add(std::string(reinterpret_cast<const char*>(wide.data()), 4 * wide.size()),
-            {{"componentType", kFloats}, {"count", wide.size()}, {"type", "SCALAR"}}, 0);
+    if (at + size * count > all.size()) gltf::broken(s_.path, "has weights behind its end");
+    std::string wide;
+    for (size_t from = 0; from + before <= count; from += before)
+      wide.append(all, at + size * from, size * before)
+          .append(size * (1 + bulge_.deltas.size()), '\0');
+    Json accessor = {{"componentType", old.at("componentType")},
+                     {"count", wide.size() / size},
+                     {"type", "SCALAR"}};
+    if (old.contains("normalized")) accessor["normalized"] = old["normalized"];
+    animation["samplers"][number]["output"] = add(wide, std::move(accessor), 0);
   }
 }
 

@@ -36,10 +36,14 @@ const ShapeSpace& small_space() {
   return made;
 }
 
+const std::vector<double> kShape = {0.7, -0.4, 0.3, 0.2, -0.3};
+
+Vec3 belly_of(const Body& body) { return body.joints[kSpine2] + Vec3(0, 0, 0.1); }
+
 /// Somebody of the space with a belly that stands out by 4 cm, as no one of the space has it.
 Body dressed_one() {
-  Body out = small_space().at({0.7, -0.4, 0.3, 0.2, -0.3});
-  const Vec3 belly = out.joints[kSpine2] + Vec3(0, 0, 0.1);
+  Body out = small_space().at(kShape);
+  const Vec3 belly = belly_of(out);
   for (Point& p : out.rest.vertices) {
     const double away = (p.cast<double>() - belly).norm();
     p.z() += static_cast<float>(0.04 * std::exp(-away * away / (2 * 0.08 * 0.08)));
@@ -73,12 +77,15 @@ TemplateView view_of(const Body& body, int number) {
   return out;
 }
 
-MiddleAndMost distance_at_rest(const Body& from, const Body& to) {
-  const Points drawn = SurfaceSampler(from).draw(RngKey{9, 0}, 5000).on_rest(from);
+/// Of points of the whole surface, or of those within `around` of the belly.
+MiddleAndMost distance_at_rest(const Body& from, const Body& to, double around = 9) {
+  const Points drawn = SurfaceSampler(from).draw(RngKey{9, 0}, 20000).on_rest(from);
   std::vector<Vec3> points, vertices;
   // Where the floor is says nothing of the shape.
   const Vec3 apart = to.joints[kPelvis] - from.joints[kPelvis];
-  for (const Point& p : drawn) points.push_back(p.cast<double>() + apart);
+  for (const Point& p : drawn)
+    if ((p.cast<double>() - belly_of(from)).norm() < around)
+      points.push_back(p.cast<double>() + apart);
   for (const Point& p : to.rest.vertices) vertices.push_back(p.cast<double>());
   return middle_and_most(SurfaceDistance(to.rest)(points, vertices));
 }
@@ -91,11 +98,14 @@ TEST(TrackTemplate, FindsTheShapeAndWhatTheShapesLack) {
   const Body found =
       fit_template(small_space(), views, "scans", [&](const std::string&) { ++rounds; });
   EXPECT_EQ(rounds, 10);
-  EXPECT_GT(distance_at_rest(person, small_space().average).median, 0.010);
-  EXPECT_GT(distance_at_rest(person, small_space().at({0.7, -0.4, 0.3, 0.2, -0.3})).p95, 0.02);
-  const MiddleAndMost left = distance_at_rest(person, found);
-  EXPECT_LT(left.median, 0.005);
-  EXPECT_LT(left.p95, 0.014);
+  const MiddleAndMost whole = distance_at_rest(person, found),
+                      belly = distance_at_rest(person, found, 0.1);
+  const Body naked = small_space().at(kShape);
+  EXPECT_LT(whole.median, 0.003);
+  EXPECT_LT(whole.p95, 0.010);
+  EXPECT_LT(3 * whole.median, distance_at_rest(person, small_space().average).median);
+  // Offsets are held back, so something of the belly is missing.
+  EXPECT_LT(belly.median, 0.6 * distance_at_rest(person, naked, 0.1).median);
   EXPECT_EQ(found.rest.faces, small_space().average.rest.faces);
   EXPECT_THROW(fit_template(small_space(), {}, "scans", [](const std::string&) {}), InputError);
 }
@@ -153,7 +163,7 @@ TEST(TrackAtlas, NoTexelBelongsToTwoFaces) {
       }
   }
   EXPECT_EQ(std::count_if(claims.begin(), claims.end(), [](int n) { return n > 1; }), 0);
-  EXPECT_GT(covered, claims.size() / 5);
+  EXPECT_GT(covered, claims.size() / 8);  // of few and small charts the margins take much
   size_t drawn = 0;
   for (const int32_t f : atlas_faces(atlas, kSize)) drawn += f >= 0;
   EXPECT_NEAR(static_cast<double>(drawn), static_cast<double>(covered), 0.01 * kSize * kSize);
@@ -205,7 +215,7 @@ TEST(TrackTexture, ColoursAreTheMedianAndHolesTakeWhatIsBeside) {
 }
 
 TEST(TrackJournal, KeepsWhatItWasToldToKeep) {
-  const std::string folder = testing::TempDir() + "/track_journal";
+  const std::string folder = ::testing::TempDir() + "/track_journal";
   std::filesystem::remove_all(folder);
   std::filesystem::create_directories(folder);
   JournalFrame frame;
