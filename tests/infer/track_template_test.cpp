@@ -207,7 +207,8 @@ TEST(TrackTexture, ColoursAreTheMedianAndHolesTakeWhatIsBeside) {
     for (const int32_t v : f) middle += body.rest.vertices[static_cast<size_t>(v)] / 3;
     const PointColour wanted = colour_at(middle);
     for (size_t c = 0; c < 3; ++c)
-      off.push_back(std::abs(double{picture.rgb[3 * at + c]} / 255 - double{wanted[c]}));
+      off.push_back(std::abs(static_cast<double>(picture.rgb[3 * at + c]) / 255 -
+                             static_cast<double>(wanted[c])));
   }
   const MiddleAndMost error = middle_and_most(off);
   EXPECT_LT(error.median, 0.02);
