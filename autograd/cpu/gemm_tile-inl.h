@@ -175,40 +175,35 @@ inline void pack_b(const Strided<T>& b, int64_t k, int64_t n, T* out) {
 template <class T, int Rows>
 using Sums = typename Simd<T>::Vector[Rows][kVectors];
 
-/// The tile a (packed, Stride rows wide) times b (packed): every element one chain of multiply-adds
-/// over k in order.
-template <class T, int Rows, int Stride>
-HWY_INLINE void sum(int64_t k, const T* a, const T* b, Sums<T, Rows>& acc) {
+/// The tile a times b (packed): every element one chain of multiply-adds over k in order. a(i, l)
+/// is the number of a's row i at l.
+template <class T, int Rows, class A>
+HWY_INLINE void sum_of(int64_t k, const A& a, const T* b, Sums<T, Rows>& acc) {
   using V = typename Simd<T>::Vector;
-  for (int64_t l = 0; l < k; ++l) {
+  for (int64_t l = 0; l < k; ++l, b += Simd<T>::cols) {
     alignas(kVectorBytes) V bv[kVectors];
 #pragma GCC unroll 2
     for (int v = 0; v < kVectors; ++v) bv[v] = *reinterpret_cast<const V*>(b + v * Simd<T>::width);
 #pragma GCC unroll 12
     for (int i = 0; i < Rows; ++i) {
 #pragma GCC unroll 2
-      for (int v = 0; v < kVectors; ++v) acc[i][v] += a[i] * bv[v];
+      for (int v = 0; v < kVectors; ++v) acc[i][v] += a(i, l) * bv[v];
     }
-    a += Stride;
-    b += Simd<T>::cols;
   }
 }
 
-/// The same of rows as they lie in memory, `row` numbers from one to the next: the same bits.
+/// a is packed, Stride rows wide.
+template <class T, int Rows, int Stride>
+HWY_INLINE void sum(int64_t k, const T* a, const T* b, Sums<T, Rows>& acc) {
+  sum_of<T, Rows>(
+      k, [a](int i, int64_t l) HWY_ATTR { return a[l * Stride + i]; }, b, acc);
+}
+
+/// Rows of a as they lie in memory, `row` numbers from one to the next: the same bits.
 template <class T, int Rows>
 HWY_INLINE void sum_rows(int64_t k, const T* a, int64_t row, const T* b, Sums<T, Rows>& acc) {
-  using V = typename Simd<T>::Vector;
-  for (int64_t l = 0; l < k; ++l) {
-    alignas(kVectorBytes) V bv[kVectors];
-#pragma GCC unroll 2
-    for (int v = 0; v < kVectors; ++v) bv[v] = *reinterpret_cast<const V*>(b + v * Simd<T>::width);
-#pragma GCC unroll 12
-    for (int i = 0; i < Rows; ++i) {
-#pragma GCC unroll 2
-      for (int v = 0; v < kVectors; ++v) acc[i][v] += a[i * row + l] * bv[v];
-    }
-    b += Simd<T>::cols;
-  }
+  sum_of<T, Rows>(
+      k, [a, row](int i, int64_t l) HWY_ATTR { return a[i * row + l]; }, b, acc);
 }
 
 /// out [Rows, cols] = a (packed, Stride rows wide) times b (packed), plus out if Add.
